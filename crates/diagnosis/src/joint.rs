@@ -13,6 +13,7 @@ mod filter;
 use model::effect::Found;
 use model::record::rows::Bursts;
 
+use crate::fit::before_filter;
 use crate::fit::channel::{Form, Joint, Levels, State, Term, VarianceFound};
 use crate::fit::estimate;
 use crate::fit::likelihood::least_walk;
@@ -259,9 +260,14 @@ fn coordinates(t: &Term) -> &[f64] {
 pub(crate) fn levels_of(s: &Searched<'_>, state: &State) -> Levels {
     let n = s.search.panel.bins.n as f64;
     let errors = estimate::noise_errors(&s.search.panel, state);
+    // What is before a filter has an error of its own beside this one.
+    let white_error = match state.noise.terms.is_empty() || state.noise.filter().is_some() {
+        true => (2.0 / n).sqrt() * state.wider.first().unwrap_or(&1.0),
+        false => before_filter::of_white(&s.search.panel, state),
+    };
     Levels {
         white: state.solution.white,
-        white_error: (2.0 / n).sqrt() * state.wider.first().unwrap_or(&1.0),
+        white_error,
         log_walk: state.noise.log_walk,
         walk_error: errors.first().copied().unwrap_or(f64::NAN) / 2.0,
     }

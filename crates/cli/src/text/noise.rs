@@ -39,7 +39,7 @@ pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option
     let smallest = || smallest_walk(own.baseline.get("angle_random_walk"), seconds);
     let has_interval = value.std_error.is_some_and(|e| e > 0.0 && e.is_finite());
     // Without an interval what is smaller than can be seen is no estimate.
-    let unseen = || limit < NOTHING * smallest() || !has_interval && limit < smallest();
+    let unseen = || limit <= NOTHING * smallest() || !has_interval && limit < smallest();
     let shown = match key {
         "bias" => Shown::Size,
         "rate_random_walk" if unseen() => Shown::Nothing,

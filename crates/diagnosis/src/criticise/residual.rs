@@ -8,10 +8,12 @@ use numerics::column::{dot, sum_of};
 use numerics::tails::{chi_tail, kurtosis_score, normal_tail};
 
 mod dependence;
+mod swing;
 
 pub(crate) use dependence::{
     Repeats, bicovariance, neighbours, repeats, rhythm_in_samples, three_readings, variance_rhythm,
 };
+pub(crate) use swing::swing;
 
 /// Lags of the Ljung-Box statistic.
 const LAGS: usize = 20;

@@ -62,6 +62,7 @@ pub(super) fn handed_over(
 ) -> HandedOver {
     let count = options.replicates;
     let causes: Vec<&Finding> = told.findings.iter().chain(&told.nearest).collect();
+    let nearest: Vec<&Finding> = told.nearest.iter().collect();
     let (read, its) = as_read.map_or((grid, searched), |r| (r.grid, r.searched.as_slice()));
     let baseline_model = handover::baseline_model(its, read, fitted_on(grid, options));
     let is_mended = |e: &EffectModel| mended.iter().any(|f| is_of(f, e));
@@ -75,7 +76,7 @@ pub(super) fn handed_over(
         model
     };
     let mut wanted = Wanted::of(&told.unexplained);
-    let mut fitted = unnamed::fit(searched, grid, &wanted, &causes);
+    let mut fitted = unnamed::fit(searched, grid, &wanted, &causes, &nearest);
     let mut extended_model = extended(&fitted);
     let found = told.findings.iter().flat_map(|f| &f.channels);
     let found: BTreeSet<&String> = found
@@ -103,7 +104,7 @@ pub(super) fn handed_over(
     // What strays of readings that lie between others is that they do, and no term takes it up.
     for _ in 0..if between { 0 } else { ROUNDS } {
         strays.iter().for_each(|o| wanted.add(o));
-        let again = unnamed::fit(searched, grid, &wanted, &causes);
+        let again = unnamed::fit(searched, grid, &wanted, &causes, &nearest);
         if again == fitted {
             break;
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use model::effect::extremes;
 use model::unnamed::{self, Unnamed};
 
+use crate::criticise::residual::swing;
 use crate::ingest::types::Grid;
 use crate::report::left_over::{Left, left_over};
 use crate::result::{Consequence, Unexplained};
@@ -142,8 +143,13 @@ fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) 
         material,
         ..plain(group)
     };
+    let swings = group
+        .iter()
+        .any(|o| o.check.is_some_and(|c| c.0 == CheckId::VarianceRhythm));
+    let swing = swings.then(|| swing(&s.e)).flatten();
+    let swing = swing.map(|cycles| cycles * grid.rate_hz);
     Unexplained {
-        what: sentence(group, &entry, &follows, &s.target.unit),
+        what: sentence(group, &entry, &follows, swing, &s.target.unit),
         ..entry
     }
 }
@@ -154,13 +160,27 @@ fn stated(group: &[Observation], rate_hz: f64) -> Option<[f64; 2]> {
     Some(place.map(|share| 0.5 * rate_hz * share))
 }
 
-/// One sentence: what, where, how large, what comes nearest.
-fn sentence(group: &[Observation], entry: &Unexplained, follows: &[&String], unit: &str) -> String {
+/// One sentence: what, where, how large, what comes nearest. A `swing` of the size of the noise, Hz, is what checks see parts of.
+fn sentence(
+    group: &[Observation],
+    entry: &Unexplained,
+    follows: &[&String],
+    swing: Option<f64>,
+    unit: &str,
+) -> String {
     let checks = group.iter().filter_map(|o| o.check);
     let lead = checks.min_by(|a, b| a.1.total_cmp(&b.1)).map(|c| c.0);
     // What says of itself what it is goes before the checks that see parts of it.
     let structure = group.iter().find(|o| o.structure);
     let seen = || match (lead.and_then(CheckId::seen_as), follows) {
+        (_, []) if swing.is_some() => {
+            let hz = swing.unwrap_or_default();
+            format!(
+                "the size of the noise swings with a period of {} s ({} Hz)",
+                digits(hz.recip()),
+                digits(hz)
+            )
+        }
         (Some(seen), []) => seen.to_owned(),
         (Some(seen), some) => format!("{seen}, with {}", joined(some)),
         (None, []) if group.iter().any(|o| !o.nearest.is_empty()) => {

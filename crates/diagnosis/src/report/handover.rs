@@ -62,15 +62,8 @@ pub(crate) fn extended_model(
     extended.unnamed = unnamed.terms.iter().filter(known).cloned().collect();
     for own in &unnamed.beside {
         let channel = extended.channels.iter_mut().find(|c| c.name == own.channel);
-        let Some(channel) = channel else { continue };
-        for (name, part) in [
-            ("angle_random_walk", own.white),
-            ("rate_random_walk", own.walk),
-        ] {
-            if let Some(p) = channel.baseline.get_mut(name) {
-                p.value *= part.sqrt();
-                p.std_error = p.std_error.map(|e| e * part.sqrt());
-            }
+        if let Some(channel) = channel {
+            own.on(&mut channel.baseline);
         }
     }
     let read: Vec<EffectModel> = (extended.effects.iter())
@@ -228,7 +221,7 @@ fn parameters(s: &Searched<'_>, state: &State, levels: &Levels, grid: &Grid) -> 
         named(
             "angle_random_walk",
             white * density,
-            white * density * levels.white_error / 2.0,
+            white * density * before_filter::error_of_root(1.0, levels.white_error),
             &density_unit,
         ),
         named(

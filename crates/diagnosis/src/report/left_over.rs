@@ -147,6 +147,16 @@ impl Power {
         }
     }
 
+    /// Terms that nearly cancel, as a line and a band about it, have more than the readings together: what is left is no more
+    /// than these.
+    fn within(&mut self, variance: f64) {
+        let beyond: f64 = self.excess.iter().map(|x| x.abs()).sum();
+        if beyond > variance {
+            let part = variance / beyond;
+            self.excess.iter_mut().for_each(|x| *x *= part);
+        }
+    }
+
     /// Mean square of the model, and of the model with what is beyond it, through a filter of that gain.
     fn through(&self, gain: impl Fn(f64) -> f64) -> [f64; 2] {
         let each = self.omega.iter().zip(&self.model).zip(&self.excess);
@@ -223,11 +233,12 @@ pub(crate) fn octaves(n: usize) -> impl Iterator<Item = usize> {
 ///
 /// `terms` are places of its terms that stand for it: they are a part of what is left.
 pub(super) fn left_over(s: &Searched<'_>, grid: &Grid, terms: &[usize]) -> Left {
-    let power = Power::of(s, terms);
+    let mut power = Power::of(s, terms);
     let (n, rate_hz) = (grid.n, grid.rate_hz);
-    let beyond: f64 = power.excess.iter().map(|x| x.abs()).sum();
     let mean = s.target.y.iter().sum::<f64>() / n as f64;
     let variance = s.target.y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
+    power.within(variance);
+    let beyond: f64 = power.excess.iter().map(|x| x.abs()).sum();
     let share = if variance > 0.0 {
         beyond / variance
     } else {

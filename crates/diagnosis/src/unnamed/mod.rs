@@ -5,17 +5,20 @@
 
 mod bump;
 mod followed;
+mod sizes;
 mod spectrum;
 mod white;
 
 use std::collections::BTreeSet;
 
 use model::Parameter;
-use model::effect::{Signal, extremes};
+use model::effect::{Parameters, Signal, extremes};
 use model::record::Quantity;
 use model::unnamed::{Column, Domain, Unnamed};
 
 use crate::criticise::one_source;
+use crate::fit::before_filter::{HALF_WIDTH, error_of_root, error_of_square};
+use crate::fit::channel::{Form, Term};
 use crate::ingest::types::Grid;
 use crate::result::Finding;
 use crate::search::searched::Searched;
@@ -66,8 +69,30 @@ pub(crate) struct Beside {
     pub channel: String,
     /// Of the white variance.
     pub white: f64,
+    /// Standard error of that.
+    pub white_error: f64,
+    /// What all that has no name has of the white variance at each frequency: white as well as not.
+    pub floor: f64,
     /// Of the variance of a step of the random walk.
     pub walk: f64,
+}
+
+impl Beside {
+    /// The noise of a baseline beside it.
+    pub(crate) fn on(&self, baseline: &mut Parameters) {
+        if let Some(p) = baseline.get_mut("angle_random_walk") {
+            let variance = p.value * p.value;
+            let before = error_of_square(p.value, p.std_error.unwrap_or(0.0));
+            let fitted = before.max(variance * self.white_error);
+            let error = fitted.hypot(variance * self.floor / HALF_WIDTH);
+            p.value *= self.white.sqrt();
+            p.std_error = Some(error_of_root(p.value * p.value, error));
+        }
+        if let Some(p) = baseline.get_mut("rate_random_walk") {
+            p.value *= self.walk.sqrt();
+            p.std_error = p.std_error.map(|e| e * self.walk.sqrt());
+        }
+    }
 }
 
 /// What was fitted.
@@ -85,12 +110,13 @@ const SHARING: [&str; 4] = [
     model::effects::base_motion::ID,
 ];
 
-/// The terms of what is wanted, beside these causes.
+/// The terms of what is wanted, beside these causes, of which some only stand `nearest` to what has no name.
 pub(crate) fn fit(
     searched: &[Searched<'_>],
     grid: &Grid,
     wanted: &Wanted,
     causes: &[&Finding],
+    nearest: &[&Finding],
 ) -> Fitted {
     let mut all = Fitted::default();
     let mut whites: Vec<(&Searched<'_>, White)> = vec![];
@@ -119,12 +145,17 @@ pub(crate) fn fit(
             None => s.state.noise.over(&s.search.panel.bins),
         };
         let white = White::of(s, density);
+        let floor = floor(s, own.as_ref().map_or(&[], |f| &f.bumps), nearest);
         if let Some(found) = &own {
             all.terms.extend(of_spectrum(s, found, grid.rate_hz));
+        }
+        if own.is_some() || floor > 0.0 {
             all.beside.push(Beside {
                 channel: name.clone(),
-                white: found.white,
-                walk: found.walk,
+                white: own.as_ref().map_or(1.0, |f| f.white),
+                white_error: own.as_ref().map_or(0.0, |f| f.white_error),
+                floor,
+                walk: own.as_ref().map_or(1.0, |f| f.walk),
             });
         }
         if alone {
@@ -137,6 +168,35 @@ pub(crate) fn fit(
     let of_pair = |pair| of_pair(pair, &whites, causes);
     all.terms.extend(wanted.pairs.iter().filter_map(of_pair));
     all
+}
+
+/// What bumps, and the processes that only stand nearest to what has no name, have together of the white density at every frequency.
+fn floor(s: &Searched<'_>, bumps: &[Bump], nearest: &[&Finding]) -> f64 {
+    let bins = &s.search.panel.bins;
+    let stands = |t: &&Term| {
+        let mut all = nearest.iter().filter(|f| f.cause == t.effect.id());
+        all.any(|f| f.channels.contains(&s.target.name))
+    };
+    let mut sum = vec![0.0; bins.at.omega.len()];
+    let mut add = |density: Vec<f64>| sum.iter_mut().zip(density).for_each(|(s, d)| *s += d);
+    bumps.iter().for_each(|b| add(b.over(&bins.at.omega)));
+    for term in s.state.terms.iter().filter(stands) {
+        match &term.form {
+            Form::Covariance(process, theta) if !process.filters_white() => {
+                add(process.density(theta, &bins.at));
+            }
+            _ => {}
+        }
+    }
+    let least = |each: &mut dyn Iterator<Item = f64>| each.fold(f64::INFINITY, f64::min);
+    match s.state.noise.filter().map(|only| only.over(bins)) {
+        None => least(&mut sum.iter().copied()),
+        // Through the filter, or as what comes behind it: of either the slowest make an angle.
+        Some(white) => {
+            let through = least(&mut sum.iter().zip(&white).map(|(s, w)| s / w));
+            through.max(least(&mut sum.iter().copied()) / white[0])
+        }
+    }
 }
 
 /// What the white noise of two channels shares, where none of these causes has it.

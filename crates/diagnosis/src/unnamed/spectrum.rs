@@ -10,18 +10,13 @@ use std::sync::Arc;
 use model::effect::{Covariance, Hypothesis};
 
 use super::bump::{Bump, lorentzian, places};
+use super::sizes::{Fit, LEAST_SCORE};
 use crate::fit::channel::{Form, Term};
 use crate::fit::likelihood::{Bins, Noise};
 use crate::search::searched::Searched;
-use numerics::column::dot;
 
 /// Most bumps of a channel.
 const MOST: usize = 16;
-/// Score, the square of a standard normal value of one sign, that a further bump has to reach: bumps are sought where something is
-/// left, and what three standard errors make is in the simulations too.
-const LEAST_SCORE: f64 = 9.0;
-/// Widths of a bump about the bin that stands out most, over that of the bin.
-const WIDTHS_OF_A_BIN: [f64; 3] = [1.0, 3.0, 9.0];
 /// Widths of its bands to either side in which a tone is sought, most places there, and least share of its time in one.
 const REACH: f64 = 3.0;
 const MOST_PITCHES: f64 = 64.0;
@@ -31,11 +26,8 @@ const MOST_ROUNDING: f64 = 0.5;
 const MOST_CORRELATED: f64 = 0.999;
 /// Variance of a bump over the white one below which it is none.
 const LEAST_PART: f64 = 1e-9;
-/// Least part of the information on a bump that what is fitted beside it leaves: of less nothing is told.
-const LEAST_LEFT: f64 = 0.02;
-/// Rounds of the fit while bumps are added, and of the last one.
-const ROUNDS: usize = 60;
-const LAST_ROUNDS: usize = 600;
+/// Rounds of the fit of the places that a tone visits.
+const ROUNDS: usize = 600;
 
 /// What describes the noise of a channel better than its causes do.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,6 +36,8 @@ pub(super) struct Spectrum {
     pub bumps: Vec<Bump>,
     /// White variance beside it, over that without it.
     pub white: f64,
+    /// Standard error of that, of all that was fitted along with it.
+    pub white_error: f64,
     /// Variance of a step of the random walk beside it, over that without it.
     pub walk: f64,
     /// Tones whose band has the shape of several, and these.
@@ -114,106 +108,6 @@ fn pitches(parts: &[Bump]) -> Vec<Bump> {
         .collect()
 }
 
-/// The sums that a fit runs over.
-struct Fit<'a> {
-    counts: &'a [f64],
-    /// Energy of a coefficient over the white variance.
-    power: Vec<f64>,
-    /// What has a name and stays.
-    named: Vec<f64>,
-    /// White noise, random walk, bumps.
-    shapes: Vec<Vec<f64>>,
-    sizes: Vec<f64>,
-}
-
-impl Fit<'_> {
-    fn density(&self) -> Vec<f64> {
-        let mut sum = self.named.clone();
-        for (shape, size) in self.shapes.iter().zip(&self.sizes) {
-            let each = sum.iter_mut().zip(shape);
-            each.for_each(|(s, v)| *s += size * v);
-        }
-        sum
-    }
-
-    /// Likelihood ratio's derivative by the size of a shape, over its standard deviation beside the sizes that are fitted along with
-    /// it: a broad bump is nearly white, and what white noise takes up of it is no information.
-    fn score(&self, density: &[f64], shape: &[f64], beside: &[Vec<f64>]) -> f64 {
-        let own = self.relative(density, shape);
-        let off = self.counts.iter().zip(&self.power).zip(density);
-        let up: f64 = (off.zip(&own))
-            .map(|(((m, p), s), v)| (0.5 * m).sqrt() * (p / s - 1.0) * v)
-            .sum();
-        let taken: f64 = beside.iter().map(|b| dot(b, &own).powi(2)).sum();
-        let information = dot(&own, &own);
-        let left = (information - taken).max(LEAST_LEFT * information);
-        up / left.sqrt().max(f64::MIN_POSITIVE)
-    }
-
-    /// Bumps about the bin that stands out most of the density: what is narrow stands between the places of any list.
-    fn about_the_highest(&self, density: &[f64], bins: &Bins) -> Vec<Bump> {
-        let off = self.counts.iter().zip(&self.power).zip(density);
-        let scores = off.map(|((m, p), s)| (0.5 * m).sqrt() * (p / s - 1.0));
-        let highest = scores.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        let found = highest.filter(|(_, z)| *z > 0.0 && z * z > LEAST_SCORE);
-        let of_bin = |k: usize| {
-            let width = self.counts[k] * PI / bins.n as f64;
-            WIDTHS_OF_A_BIN.map(|by| Bump {
-                center: bins.at.omega[k],
-                width: by * width,
-                variance: 1.0,
-            })
-        };
-        found.map_or(vec![], |(k, _)| of_bin(k).into())
-    }
-
-    /// A shape over the density, by the root of the information of each bin.
-    fn relative(&self, density: &[f64], shape: &[f64]) -> Vec<f64> {
-        let each = self.counts.iter().zip(density).zip(shape);
-        each.map(|((m, s), v)| (0.5 * m).sqrt() * v / s).collect()
-    }
-
-    /// The directions of the shapes of these places, each without what those before it have.
-    fn directions(&self, density: &[f64], places: impl Iterator<Item = usize>) -> Vec<Vec<f64>> {
-        let mut all: Vec<Vec<f64>> = vec![];
-        for k in places {
-            let mut own = self.relative(density, &self.shapes[k]);
-            let before = dot(&own, &own);
-            for other in &all {
-                let by = dot(&own, other);
-                own.iter_mut().zip(other).for_each(|(a, b)| *a -= by * b);
-            }
-            let left = dot(&own, &own);
-            if left > LEAST_LEFT * before {
-                own.iter_mut().for_each(|a| *a /= left.sqrt());
-                all.push(own);
-            }
-        }
-        all
-    }
-
-    /// Sizes climb the likelihood and stay positive.
-    ///
-    /// # Source
-    /// Fevotte, Idier (2011), Algorithms for nonnegative matrix factorization with the beta-divergence, Neural Comput. 23:
-    /// 2421-2456: multiplicative updates of the Itakura-Saito divergence, exponent 1/2, under which it falls.
-    fn climb(&mut self, rounds: usize) {
-        for _ in 0..rounds {
-            let density = self.density();
-            for (shape, size) in self.shapes.iter().zip(&mut self.sizes) {
-                let each = self.counts.iter().zip(&self.power).zip(&density).zip(shape);
-                let (more, less) = each.fold((0.0, 0.0), |(more, less), (((m, p), s), v)| {
-                    let part = m * v / s;
-                    (more + part * p / s, less + part)
-                });
-                if less > 0.0 {
-                    *size *= (more / less).sqrt();
-                }
-            }
-        }
-    }
-}
-
 /// Density of the white noise through the filters that it goes through, over the bins: a part `rounding` of its variance comes
 /// behind them, and what is filtered has the larger correlation that gives the readings theirs.
 fn filtered(noise: &Noise, bins: &Bins, rounding: f64) -> Vec<f64> {
@@ -253,7 +147,7 @@ fn visited(fit: &mut Fit<'_>, merged: &[AsOne], omega: &[f64]) -> Vec<Vec<Bump>>
     };
     put(fit, &combs);
     if fit.shapes.len() > fixed {
-        fit.climb(LAST_ROUNDS);
+        fit.climb(ROUNDS);
         let mut sizes = fit.sizes[fixed..].iter();
         for comb in &mut combs {
             for (bump, size) in comb.iter_mut().zip(&mut sizes) {
@@ -312,7 +206,7 @@ fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize
         })
         .collect();
     let mut chosen: Vec<usize> = vec![];
-    fit.climb(ROUNDS);
+    fit.settle();
     while chosen.len() < MOST {
         let density = fit.density();
         for bump in fit.about_the_highest(&density, bins) {
@@ -325,7 +219,7 @@ fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize
         let best = free
             .map(|k| (k, fit.score(&density, &shapes[k], &beside)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((k, score)) = best.filter(|b| b.1 > 0.0 && b.1 * b.1 > LEAST_SCORE) else {
+        let Some((k, _)) = best.filter(|b| b.1 > 0.0 && b.1 * b.1 > LEAST_SCORE) else {
             break;
         };
         chosen.push(k);
@@ -335,12 +229,16 @@ fn add_bumps(fit: &mut Fit<'_>, bumps: &mut Vec<Bump>, bins: &Bins, fixed: usize
             variance: 1.0,
         });
         fit.shapes.push(shapes[k].clone());
-        // As much as its score says, from where it climbs on.
-        let peak = shapes[k].iter().zip(&density).map(|(v, s)| v / s);
-        let most = peak.fold(0.0, f64::max);
-        fit.sizes.push(score.min(1.0) / most.max(f64::MIN_POSITIVE));
-        fit.climb(ROUNDS);
+        fit.sizes.push(0.0);
+        fit.settle();
     }
+    // What was added for what those after it make the better, and what is white together, goes again.
+    let stay = fit.prune(fixed + of_tones, LEAST_SCORE);
+    let mut own = bumps.split_off(of_tones).into_iter().enumerate();
+    bumps.extend(
+        stay.iter()
+            .filter_map(|k| own.find(|(j, _)| j == k).map(|(_, b)| b)),
+    );
 }
 
 /// The spectrum of a channel, none where its causes' model describes it. Bands that are one in the model are told by their parts.
@@ -355,7 +253,6 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
     if bumps.is_empty() {
         return None;
     }
-    fit.climb(LAST_ROUNDS);
     for (bump, size) in bumps.iter_mut().zip(&fit.sizes[fixed..]) {
         bump.variance *= size;
     }
@@ -373,6 +270,7 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
     Some(Spectrum {
         bumps,
         white,
+        white_error: fit.error(0),
         walk: fit.sizes[1],
         tones,
         density: fit.density(),
@@ -382,30 +280,6 @@ pub(super) fn spectrum(s: &Searched<'_>, merged: &[AsOne]) -> Option<Spectrum> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sizes_climb_to_those_of_the_power() {
-        let shape = |center: f64| -> Vec<f64> {
-            (1..400)
-                .map(|k| lorentzian(center, 0.1, PI * f64::from(k) / 400.0))
-                .collect()
-        };
-        let shapes = vec![vec![1.0; 399], shape(0.5), shape(2.0)];
-        let mut fit = Fit {
-            counts: &[10.0; 399],
-            power: vec![],
-            named: vec![0.2; 399],
-            shapes,
-            sizes: vec![0.7, 0.3, 0.05],
-        };
-        fit.power = fit.density();
-        fit.sizes = vec![1.0, 0.1, 0.1];
-        fit.climb(LAST_ROUNDS);
-        for (size, truth) in fit.sizes.iter().zip([0.7, 0.3, 0.05]) {
-            assert!((size / truth - 1.0).abs() < 0.01, "{size} {truth}");
-        }
-        assert!(fit.score(&fit.density(), &shape(1.2), &[]).abs() < 0.1);
-    }
 
     #[test]
     fn what_is_narrow_leaves_the_white_noise_as_it_is() {
@@ -425,36 +299,6 @@ mod tests {
         };
         let mut bumps = vec![];
         add_bumps(&mut fit, &mut bumps, &bins, 1);
-        fit.climb(LAST_ROUNDS);
         assert!((fit.sizes[0] - 1.0).abs() < 0.02, "{}", fit.sizes[0]);
-    }
-
-    #[test]
-    fn a_broad_bump_counts_by_what_white_noise_does_not_take_up_of_it() {
-        let omega: Vec<f64> = (1..400).map(|k| PI * f64::from(k) / 400.0).collect();
-        let broad = Bump {
-            center: 2.2,
-            width: 0.7 * 2.2,
-            variance: 1.0,
-        }
-        .over(&omega);
-        let mut fit = Fit {
-            counts: &[150.0; 399],
-            power: broad.iter().map(|b| 0.97 + 0.03 * b).collect(),
-            named: vec![0.0; 399],
-            shapes: vec![vec![1.0; 399]],
-            sizes: vec![1.0],
-        };
-        fit.climb(LAST_ROUNDS);
-        let density = fit.density();
-        let beside = fit.directions(&density, 0..1);
-        // 60 000 coefficients of a relative error of 1.4 each, and an rms excess of 0.03 times that of the bump about its mean.
-        let n = omega.len() as f64;
-        let mean = broad.iter().sum::<f64>() / n;
-        let rms = (broad.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / n).sqrt();
-        let wanted = 0.03 * rms * (0.5 * 150.0 * n).sqrt();
-        let score = fit.score(&density, &broad, &beside);
-        assert!((score / wanted - 1.0).abs() < 0.05, "{score} {wanted}");
-        assert!(fit.score(&density, &broad, &[]) < 0.8 * score);
     }
 }

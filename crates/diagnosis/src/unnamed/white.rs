@@ -77,12 +77,13 @@ impl<'a> White<'a> {
         // What of the differences is not chance (James and Stein).
         let kept = (1.0 - degrees / far).max(0.0);
         let middle = |k: usize| (k as f64 + 0.5) * length as f64 / rate_hz;
-        Some((
-            (0..count).map(middle).collect(),
-            (factors.iter())
-                .map(|f| (1.0 + kept * (f - 1.0)).max(LEAST_FACTOR))
-                .collect(),
-        ))
+        let mut told: Vec<f64> = (factors.iter())
+            .map(|f| (1.0 + kept * (f - 1.0)).max(LEAST_FACTOR))
+            .collect();
+        // The white variance is the mean over the record.
+        let mean = mean_of_course(&told);
+        told.iter_mut().for_each(|f| *f /= mean);
+        Some(((0..count).map(middle).collect(), told))
     }
 
     /// Skewness and excess kurtosis of the white noise of the readings before they are rounded, where they are not those of a
@@ -177,7 +178,44 @@ impl<'a> White<'a> {
     }
 }
 
+/// Mean of a factor whose logarithm goes straight from the middle of each stretch to that of the next, as a simulation has it.
+fn mean_of_course(factors: &[f64]) -> f64 {
+    let between = |w: &[f64]| {
+        let by = (w[1] / w[0]).ln();
+        if by.abs() < 1e-6 {
+            0.5 * (w[0] + w[1])
+        } else {
+            (w[1] - w[0]) / by
+        }
+    };
+    let ends = factors.first().zip(factors.last());
+    let ends = ends.map_or(0.0, |(a, b)| 0.5 * (a + b));
+    let all = factors.windows(2).map(between).sum::<f64>() + ends;
+    all / factors.len().max(1) as f64
+}
+
 /// Angular frequency in Hz.
 pub(super) fn hz(omega: f64, rate_hz: f64) -> f64 {
     0.5 * rate_hz * omega / PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_of_a_course_is_that_of_what_is_simulated() {
+        let factors = [1.4f64, 0.9, 0.6, 0.6, 2.0];
+        let steps = 10_000;
+        let at = |k: i32| {
+            let place = 5.0 * (f64::from(k) + 0.5) / f64::from(steps) - 0.5;
+            let place = place.clamp(0.0, 4.0);
+            let low = (place as usize).min(3);
+            let part = place - low as f64;
+            (factors[low].ln() * (1.0 - part) + factors[low + 1].ln() * part).exp()
+        };
+        let mean = (0..steps).map(at).sum::<f64>() / f64::from(steps);
+        let told = mean_of_course(&factors);
+        assert!((told / mean - 1.0).abs() < 1e-4, "{told} {mean}");
+    }
 }

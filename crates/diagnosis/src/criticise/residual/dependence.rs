@@ -270,17 +270,17 @@ fn strongest_line(series: &[f64], fft: &mut Option<RealFft>) -> Option<(f64, f64
 }
 
 /// The strongest line of the products up to a span.
-struct Rhythm {
-    span: usize,
+pub(super) struct Rhythm {
+    pub span: usize,
     /// Chi-square, two degrees.
-    statistic: f64,
+    pub statistic: f64,
     /// Cycles per sample.
-    at: f64,
+    pub at: f64,
     /// At how many frequencies of all spans one was sought.
-    count: usize,
+    pub count: usize,
 }
 
-fn rhythm(e: &[f64]) -> Option<Rhythm> {
+pub(super) fn rhythm(e: &[f64]) -> Option<Rhythm> {
     let mut fft = None;
     let of_span = |span: &usize| {
         // Of a long record as many products of every span.
