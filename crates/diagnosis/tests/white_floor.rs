@@ -60,7 +60,7 @@ fn n_of(d: &Diagnosis) -> (f64, f64) {
 }
 
 /// Of the first eight draws 6 were right: of one the period was not said, and of one N was that of the louder part, 16 % high, which is
-/// where the nearest law of the library ends. Before white noise had a floor N was 40 % low.
+/// where the nearest law of the library ends.
 #[test]
 fn noise_whose_size_swings_keeps_its_n_and_its_period_is_said() {
     graded_over((8, 5), "a swing", |run, rng| {
