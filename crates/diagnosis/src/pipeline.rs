@@ -247,15 +247,10 @@ fn ranked_entries(
     }
     told.checks.append(&mut models.held.checks);
     let mut left = std::mem::take(&mut told.unexplained);
-    let strays = std::mem::take(&mut models.held.unexplained);
-    left.extend(strays.iter().cloned());
+    left.append(&mut models.held.unexplained);
     left.append(&mut models.taken_up);
     let terms = &models.extended_model.unnamed;
     let mut unexplained = entries(left, searched, grid, terms, matters);
-    // By what simulations have another record is never too small to matter.
-    for u in &mut unexplained {
-        u.material |= (strays.iter()).any(|o| o.what == u.what || u.details.contains(&o.what));
-    }
     ranked(&mut told.findings, &mut unexplained);
     unexplained
 }

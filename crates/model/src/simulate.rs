@@ -272,17 +272,18 @@ pub fn simulate_in_the_world_of(
     seed: u64,
 ) -> Result<Record, SimulateError> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let (model, world, read) = world_of(model, record, rate_hz, Some(&mut rng))?;
+    let (model, world, read) = world_of(model, model, record, rate_hz, Some(&mut rng))?;
     run(&model, world, read, rate_hz, rng)
 }
 
 /// What each gyro read, where the record has it.
 type Read = [Option<Vec<f64>>; 3];
 
-/// The model as it is simulated in the world of a record, that world, and the slow part of each axis that moved, deg/s. Without
-/// random numbers nothing is drawn of which the record says what it was.
+/// The model as it is simulated in the world of a record, that world, and the slow part of each axis that moved, deg/s, the motion
+/// as the model `by` understands what was read. Without random numbers nothing is drawn of which the record says what it was.
 fn world_of(
     model: &ModelFile,
+    by: &ModelFile,
     record: &Record,
     rate_hz: f64,
     rng: Option<&mut Xoshiro256PlusPlus>,
@@ -314,12 +315,13 @@ fn world_of(
         acc: Axis::ALL.map(|axis| seen(Quantity::Acc, Some(axis), 1.0 / STANDARD_GRAVITY)),
     };
     let mut world = World::stated_but(&model.excitation, samples, rate_hz, rng, recorded);
-    let (model, read) = moved_like(model, record, rate_hz);
+    let (model, moved) = moved_like(model, by, record, rate_hz);
     // What the other axes take of a motion.
-    for (motion, read) in world.motion.iter_mut().zip(&read) {
-        if let Some(read) = read {
-            let mean = read.iter().sum::<f64>() / samples as f64;
-            *motion = read.iter().map(|v| v - mean).collect();
+    let mut read = Read::default();
+    for (axis, moved) in moved.into_iter().enumerate() {
+        if let Some(moved) = moved {
+            world.motion[axis] = moved.motion;
+            read[axis] = Some(moved.read);
         }
     }
     Ok((model, world, read))

@@ -141,6 +141,7 @@ fn read(
         skip_bad,
         topic,
         span,
+        base: None,
     };
     let mut hash = Sha256::new();
     py.detach(|| {

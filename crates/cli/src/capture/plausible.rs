@@ -68,7 +68,15 @@ fn gravity(record: &Record) -> Option<String> {
         return None;
     }
     let norm = axes.iter().map(|a| a * a).sum::<f64>().sqrt();
-    let is_near = |of: f64| (norm / of - 1.0).abs() < OF_GRAVITY;
+    // Of a sensor that is turned from one position to another no axis has a middle, and gravity has one all the same.
+    let columns: Vec<_> = record.all(Quantity::Acc).map(|c| &c.values).collect();
+    let at = |i: usize| columns.iter().map(|c| c[i] * c[i]).sum::<f64>().sqrt();
+    let by_row = median((0..record.len()).map(at))?;
+    let is_near = |of: f64| {
+        [norm, by_row]
+            .iter()
+            .any(|a| (a / of - 1.0).abs() < OF_GRAVITY)
+    };
     if is_near(STANDARD_GRAVITY) {
         return None;
     }
@@ -80,14 +88,14 @@ fn gravity(record: &Record) -> Option<String> {
     ];
     let read = format!(
         "the accelerometers read {} m/s^2 in the middle, and gravity is 9.81",
-        short(norm)
+        short(by_row)
     );
     match should.iter().find(|(of, _)| is_near(*of)) {
         Some((_, unit)) => Some(format!(
             "{read}: is the file in {unit}? Then say `--units acc={unit}`"
         )),
         // Some systems take gravity off, and some parts are turned during a record.
-        None if !(0.5 * STANDARD_GRAVITY..=2.0 * STANDARD_GRAVITY).contains(&norm) => {
+        None if !(0.5 * STANDARD_GRAVITY..=2.0 * STANDARD_GRAVITY).contains(&by_row) => {
             Some(format!(
                 "{read}: see that the unit is right (`--units acc=...`), or gravity was taken off"
             ))
@@ -245,6 +253,26 @@ mod tests {
         assert!(said.starts_with("gyro_y reads as gyro_x"), "{said}");
         record.channels[0].values[500] += 1e-9;
         assert_eq!(copy(&record), None);
+    }
+
+    #[test]
+    fn a_sensor_turned_from_position_to_position_has_gravity_in_no_axis_and_in_every_row() {
+        let positions = |size: f64| {
+            let mut record = record(0.3, [0.0; 3], 25.0);
+            for (k, c) in record.channels[2..].iter_mut().enumerate() {
+                for (i, v) in c.values.iter_mut().enumerate() {
+                    let sign = if i / 500 == 0 { 1.0 } else { -1.0 };
+                    *v += if i / 100 % 3 == k { sign * size } else { 0.0 };
+                }
+            }
+            doubts(&record, false)
+        };
+        assert!(positions(STANDARD_GRAVITY).is_empty());
+        let in_g = positions(1.0);
+        assert!(
+            in_g.len() == 1 && in_g[0].contains("--units acc=g"),
+            "{in_g:?}"
+        );
     }
 
     #[test]

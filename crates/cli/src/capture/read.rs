@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use model::record::{Channel, Header, Quantity, Record, fills, sentinels};
+use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
@@ -43,6 +43,8 @@ pub struct ReadOptions {
     pub topic: Option<String>,
     /// The part of the record that is taken; all of it without one.
     pub span: Option<Span>,
+    /// What the base did, whatever the header says of it.
+    pub base: Option<Base>,
 }
 
 /// A record, and what was left out of it.
@@ -294,6 +296,7 @@ fn finish(
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
     let mut record = sentinels::left_out(fills::left_out(Cow::Owned(record))).into_owned();
+    record.header.base = options.base.or(record.header.base);
     let doubts = doubts(&record, !found.assumed_gyros.is_empty());
     record.notes.extend(doubts);
     let unsteady = unsteady(&record);

@@ -142,6 +142,7 @@ impl Input {
             skip_bad: self.skip_bad,
             topic: self.topic.clone(),
             span: self.span,
+            base: self.base.map(Into::into),
         };
         let path = &log_of(path).map_err(|error| not_read(error, path))?;
         let read = if path.is_dir() {
@@ -164,16 +165,13 @@ impl Input {
             }),
             false => Ok(read),
         });
-        let mut read = read.map_err(|error| not_read(error, path))?;
+        let read = read.map_err(|error| not_read(error, path))?;
         if read.record.len() == 1 && read.record.header.rate_hz.is_none() {
             miette::bail!(
                 help = "was the file copied whole?",
                 "{}: one row of data, and a sample rate needs two",
                 name(path)
             );
-        }
-        if let Some(base) = self.base {
-            read.record.header.base = Some(base.into());
         }
         if read.skipped > 0 {
             warn!(

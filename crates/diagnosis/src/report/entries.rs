@@ -111,6 +111,10 @@ fn of_coupling(group: &[Observation], s: &Searched<'_>, matters: f64) -> Unexpla
 }
 
 fn of_noise(group: &[Observation], s: &Searched<'_>, grid: &Grid, matters: f64) -> Unexplained {
+    if s.target.moving {
+        // What is left has the motion in it that moved the axis, and nobody knows how large it is without.
+        return plain(group);
+    }
     let terms: Vec<usize> = group.iter().flat_map(|o| o.terms.iter().copied()).collect();
     let Left {
         rms,

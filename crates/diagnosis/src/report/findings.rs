@@ -270,7 +270,7 @@ const COPIES: usize = 12;
 
 /// Largest rate about the mean, and its standard error, of a motion in white noise: the motion is what stands out at low
 /// frequencies; what the noise that is left with it adds to the largest of many crests shows where noise is added again.
-fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
+pub(super) fn peak_rate(dct: &Dct, y: &[f64], white: f64, rate_hz: f64) -> (f64, f64) {
     let mut c = dct.forward(y);
     c[0] = 0.0;
     let fastest = (2.0 * FASTEST_HZ / rate_hz * c.len() as f64) as usize;

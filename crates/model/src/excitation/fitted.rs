@@ -7,9 +7,8 @@ use std::f64::consts::TAU;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels, moves_throughout};
+use super::moved::{BLOCK_S, MOVED, at_rest, moved_channels, moves_throughout, scale_of};
 use super::{MOTION, World};
-use crate::effect::value;
 use crate::file::{EffectModel, ModelFile};
 use crate::parameter::Parameter;
 use crate::record::{Axis, Base, Channel, Quantity, Record};
@@ -76,12 +75,7 @@ impl ModelFile {
 
     /// The record with the rates of the axes that moved as they truly were: a simulation makes the error of their scale anew.
     fn turned<'a>(&self, record: &'a Record, moved: &[String]) -> Cow<'a, Record> {
-        let scale = |name: &String| {
-            let own = self.effects.iter().filter(|e| e.cause == "scale_error");
-            let own = own.filter(|e| e.channels.is_empty() || e.channels.contains(name));
-            let relative = own.map(|e| 1.0 + value(&e.parameters, "relative"));
-            relative.product::<f64>()
-        };
+        let scale = |name: &String| scale_of(self, name);
         let mut turned = Cow::Borrowed(record);
         for name in moved.iter().filter(|n| ![0.0, 1.0].contains(&scale(n))) {
             let mut all = turned.to_mut().channels.iter_mut();

@@ -1,6 +1,7 @@
 //! A base that moved: no error of a sensor, but an input of the run.
 
 use super::fitted::rms;
+use crate::effect::value;
 use crate::file::{ChannelModel, EffectModel, ModelFile};
 use crate::parameter::Parameter;
 use crate::record::Record;
@@ -21,6 +22,23 @@ pub(super) fn moves_throughout(e: &EffectModel) -> bool {
 pub(super) fn moved_channels(model: &ModelFile) -> Vec<String> {
     let moves = model.effects.iter().filter(|e| moves_throughout(e));
     moves.flat_map(|e| e.channels.iter().cloned()).collect()
+}
+
+/// Factor by which a channel reads a rate too large under a model.
+pub(super) fn scale_of(model: &ModelFile, name: &str) -> f64 {
+    let own = model.effects.iter().filter(|e| e.cause == "scale_error");
+    let own = own.filter(|e| e.channels.is_empty() || e.channels.iter().any(|c| c == name));
+    let relative = own.map(|e| 1.0 + value(&e.parameters, "relative"));
+    relative.product::<f64>()
+}
+
+/// An axis that moved in a record.
+#[derive(Clone)]
+pub(crate) struct Moved {
+    /// Slow part of the readings that a model has of the motion, deg/s.
+    pub read: Vec<f64>,
+    /// The motion itself, about its mean, deg/s.
+    pub motion: Vec<f64>,
 }
 
 /// Standard deviations beyond which two readings near each other are no noise about the slow part of a motion. By chance that is
@@ -65,22 +83,40 @@ fn white(values: &[f64]) -> (f64, usize) {
     (rms(&near) / 6f64.sqrt(), near.len().max(1))
 }
 
-/// The model as it is simulated in the world of a record, and the slow part of each axis that moved there, deg/s: the motion
-/// is the one that was read.
+/// The model as it is simulated in the world of a record, and each axis that moved there: the motion is the one that was read, as
+/// the model `by` understands the readings.
 pub(crate) fn moved_like(
     model: &ModelFile,
+    by: &ModelFile,
     record: &Record,
     rate_hz: f64,
-) -> (ModelFile, [Option<Vec<f64>>; 3]) {
+) -> (ModelFile, [Option<Moved>; 3]) {
     let named = moved_channels(model);
+    let scales = GYROS.map(|name| scale_of(model, name));
     let mut model = model.clone();
-    let read = GYROS.map(|name| {
+    let read = [0, 1, 2].map(|axis| {
+        let name = GYROS[axis];
         let moved = named.iter().any(|n| n == name);
         let seen = record.channel(name).filter(|_| moved)?;
         let own = model.channels.iter_mut().find(|c| c.name == name)?;
         let values = held(&seen.values, 1.0)?;
         at_rest(own, &seen.values, rate_hz);
-        Some(motion(&values, rate_hz))
+        let mut read = motion(&values, rate_hz);
+        let mean = read.iter().sum::<f64>() / read.len() as f64;
+        let about: Vec<f64> = read.iter().map(|v| v - mean).collect();
+        let mut moved = about.clone();
+        let (own, known) = (scales[axis], scale_of(by, name));
+        if known != 0.0 && known != 1.0 {
+            moved.iter_mut().for_each(|v| *v /= known);
+        }
+        if known != 0.0 && own != known {
+            let each = read.iter_mut().zip(&about);
+            each.for_each(|(read, v)| *read = mean + own / known * v);
+        }
+        Some(Moved {
+            read,
+            motion: moved,
+        })
     });
     let replayed = |c: &String| GYROS.iter().zip(&read).any(|(n, r)| n == c && r.is_some());
     model.effects.retain_mut(|e| {

@@ -77,6 +77,8 @@ pub(super) struct Prepared {
     unnamed: Generic,
     /// Slow part of the axes that moved, deg/s.
     pub(super) read: [Option<Vec<f64>>; 3],
+    /// Whether the motion itself is left out of the readings.
+    pub errors_alone: bool,
     /// Seed, where each effect and each axis has random numbers of its own.
     pub apart: Option<u64>,
 }
@@ -151,6 +153,7 @@ impl Prepared {
             late,
             unnamed,
             read,
+            errors_alone: false,
             apart: None,
         };
         prepared.sized();
@@ -304,6 +307,16 @@ impl Prepared {
         }
     }
 
+    /// Factor by which the motion is in the readings of an axis.
+    fn feels(&self, axis: usize) -> f64 {
+        match (self.errors_alone, &self.read[axis]) {
+            (true, _) => self.run.scale[axis] - 1.0,
+            // Where the motion is the one that was read, it is in there.
+            (false, Some(_)) => 0.0,
+            (false, None) => self.run.scale[axis],
+        }
+    }
+
     /// Whether an axis has nothing between its white noise and its counts.
     fn plain(&self, axis: usize) -> bool {
         let late = self.late.iter().any(|a| a.axes.contains(&axis));
@@ -312,9 +325,10 @@ impl Prepared {
 
     /// The counts of a [plain](Self::plain) axis, the white noise drawn as they are made: its columns are gone through once.
     fn count_at_once(&mut self, axis: usize) {
+        let scale = self.feels(axis);
         let run = &mut self.run;
         let shape = self.unnamed.shapes[axis];
-        let (scale, unit) = (run.scale[axis], self.steps[axis]);
+        let unit = self.steps[axis];
         let mut counts = std::mem::take(&mut run.counts[axis]);
         let rates = std::mem::take(&mut run.rate[axis]);
         counts.clear();
@@ -333,12 +347,8 @@ impl Prepared {
     }
 
     fn count(&mut self, axis: usize) {
+        let scale = self.feels(axis);
         let run = &mut self.run;
-        // Where the motion is the one that was read, it is in there.
-        let scale = match self.read[axis] {
-            Some(_) => 0.0,
-            None => run.scale[axis],
-        };
         for ((rate, moves), white) in run.rate[axis]
             .iter_mut()
             .zip(&run.motion[axis])
@@ -346,7 +356,7 @@ impl Prepared {
         {
             *rate += scale * moves + white;
         }
-        if let Some(read) = &self.read[axis] {
+        if let Some(read) = self.read[axis].as_ref().filter(|_| !self.errors_alone) {
             for stretch in &run.stretches {
                 let samples = stretch.samples.clone();
                 let own = fast(&run.rate[axis][samples.clone()], run.rate_hz);

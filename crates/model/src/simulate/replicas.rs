@@ -39,11 +39,27 @@ impl Replicas {
         rate_hz: f64,
         stretches: &[Range<usize>],
     ) -> Result<Self, SimulateError> {
+        Self::in_the_motion_of(model, model, record, rate_hz, stretches)
+    }
+
+    /// The same of a model that lacks something of `whole`, by which the motion of the base is known from what was read: where it
+    /// lacks the error of a scale, it reads that motion by another one.
+    ///
+    /// # Errors
+    /// As [`super::simulate`].
+    pub fn in_the_motion_of(
+        model: &ModelFile,
+        whole: &ModelFile,
+        record: &Record,
+        rate_hz: f64,
+        stretches: &[Range<usize>],
+    ) -> Result<Self, SimulateError> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0);
         // A draw has a seed of its own: where these numbers go on to is told by an effect on the world alone.
         let on_the_world = |e: &EffectModel| effect(&e.cause).map(|e| e.stage());
         let go_on = (model.effects.iter()).any(|e| on_the_world(e) == Some(Stage::World));
-        let (model, world, read) = world_of(model, record, rate_hz, go_on.then_some(&mut rng))?;
+        let rng_of_world = go_on.then_some(&mut rng);
+        let (model, world, read) = world_of(model, whole, record, rate_hz, rng_of_world)?;
         let mut prepared = Prepared::new(&model, world, read, rate_hz, rng)?;
         let axes = model
             .channels
@@ -81,6 +97,13 @@ impl Replicas {
     #[must_use]
     pub fn apart(mut self) -> Self {
         self.prepared.apart = Some(0);
+        self
+    }
+
+    /// From now on readings lack the motion of the base itself: they are what the sensors add to it, which may be made of it.
+    #[must_use]
+    pub fn errors_alone(mut self) -> Self {
+        self.prepared.errors_alone = true;
         self
     }
 

@@ -67,3 +67,42 @@ fn a_foreign_file_without_mapping_is_told_how_to_map_it() {
     assert!(read.record.notes[0].contains("says deg/s"));
     assert!((read.record.channels[0].values[0] - 57.295_779_5).abs() < 1e-6);
 }
+
+#[test]
+fn what_is_said_of_the_base_is_known_before_anything_is_noted() {
+    let base = |base| {
+        let options = ReadOptions {
+            base,
+            ..ReadOptions::default()
+        };
+        let read = read_from(OURS.as_bytes(), &options).unwrap();
+        read.record.header.base
+    };
+    assert_eq!(base(None), Some(Base::Static));
+    assert_eq!(base(Some(Base::Moving)), Some(Base::Moving));
+}
+
+#[test]
+fn of_a_base_that_moves_by_option_no_turn_is_noted() {
+    let mut text = String::from("time_s,gyro_x [deg/s],acc_x [g],acc_y [g],acc_z [g]\n");
+    for i in 0..1000 {
+        let noise = f64::from(i * 7919 % 1000) * 1e-4;
+        let (y, z) = if i < 500 { (0.0, 1.0) } else { (1.0, 0.0) };
+        text += &format!(
+            "{},{noise},{noise},{},{}\n",
+            f64::from(i) * 0.01,
+            y + noise,
+            z + noise
+        );
+    }
+    let turned = |base| {
+        let options = ReadOptions {
+            base,
+            ..ReadOptions::default()
+        };
+        let notes = read_from(text.as_bytes(), &options).unwrap().record.notes;
+        notes.iter().any(|n| n.contains("turned against gravity"))
+    };
+    assert!(turned(None));
+    assert!(!turned(Some(Base::Moving)));
+}

@@ -72,7 +72,7 @@ impl Settling {
         let longest = LONGEST * y.len() as f64;
         let end_of = |readings: f64| ((FITTED * readings) as usize).min(end);
         let offs = std::iter::successors(Some(SHORTEST), |r| Some(2.0 * r));
-        // Of all the shortest that makes most of what there is over its own span.
+        // What part of the squares over its own span it makes.
         let made = |readings: f64| {
             let f = fit(y, readings, end_of(readings))?;
             Some((1.0 - (f.left[0] + f.left[1]) / f.about_mean, f))
