@@ -17,6 +17,9 @@ const PLAIN: f64 = 8.0;
 const FEWEST: usize = 3;
 /// Least mean stay, readings.
 const LEAST_STAY: usize = 4;
+/// Least median stay on either level, readings: single readings that are far off are no level. Of stays of a mean of four, half are
+/// as long.
+const LEAST_MEDIAN_STAY: f64 = 3.0;
 /// Readings over which the course is followed.
 const MEMORY: f64 = 32.0;
 /// Part of the readings that may lie elsewhere.
@@ -56,7 +59,7 @@ impl TwoLevels {
             followed = Followed::new(&known, &changes, distance, sigma)?;
             distance = followed.distance(&known)?;
         }
-        if distance < APART * sigma {
+        if distance < APART * sigma || followed.are_single(known.len()) {
             return None;
         }
         let mut upper = vec![false; y.len()];
@@ -188,6 +191,15 @@ impl Followed {
         starts.zip(ends).map(|(a, b)| a..b).zip(up)
     }
 
+    /// Whether the stays on one of the levels are single readings.
+    fn are_single(&self, count: usize) -> bool {
+        [false, true].into_iter().any(|level| {
+            let own = self.stays(count).filter(|(_, up)| *up == level);
+            let lengths: Vec<f64> = own.map(|(stay, _)| stay.len() as f64).collect();
+            median(&lengths) < LEAST_MEDIAN_STAY
+        })
+    }
+
     /// How far the levels are apart, by the readings on either side of each switch.
     fn distance(&self, known: &[f64]) -> Option<f64> {
         let mut left = vec![false; known.len()];
@@ -261,6 +273,14 @@ mod tests {
         y[999] = 30.0;
         let two = TwoLevels::of(&y, 0.0).expect("two levels");
         assert_eq!(two.on_the_way, [499, 999]);
+    }
+
+    #[test]
+    fn single_readings_far_off_are_no_level() {
+        let stays = [900, 1, 1500, 1, 300, 2, 2000, 1, 700];
+        for seed in 0..10 {
+            assert!(TwoLevels::of(&readings(20.0, &stays, seed), 0.0).is_none());
+        }
     }
 
     #[test]
