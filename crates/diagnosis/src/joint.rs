@@ -25,7 +25,7 @@ use filter::{Point, Series};
 /// Random walks that coefficients are averaged over, as [`crate::fit::estimate::mixture`] does.
 const WALKS: u32 = 20;
 /// Largest ln(1 + gamma) of a law.
-const MOST_LAW: f64 = 5.0;
+const MOST_LAW: f64 = 9.0;
 
 /// The joint estimate of a channel under white noise whose variance follows `laws`, or none; no estimate where a process of the
 /// channel, a band among them, is no sum of first-order ones. Of `bursts` that were laid end to end the walk goes on between
@@ -55,10 +55,12 @@ pub(crate) fn estimate(
         ((ratio - 1.0) / top, ratio / top * peak.error(i))
     });
     let laws = told.collect();
+    let innovations = model.series.innovations(&model.point(&peak.x));
     Some(Joint {
         levels,
         laws,
         found,
+        innovations,
     })
 }
 

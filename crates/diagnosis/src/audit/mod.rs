@@ -32,6 +32,7 @@ use std::collections::BTreeMap;
 use model::effects;
 use model::record::{Channel, Quantity, Record};
 
+use crate::ingest::jumps::TwoLevels;
 use crate::result::{Check, DetectionLimit, Finding, NotTested, Parameter};
 use crate::test_level::{CheckId, Observation, audit_level, on_two_threads};
 use local::Local;
@@ -322,7 +323,7 @@ impl<'a> Gyro<'a> {
         let rows = channel.values.len();
         let counts = channel.counts.as_deref().filter(|c| c.len() == rows);
         let local = match counts {
-            None => Local::new(&channel.values),
+            None => about_levels(&channel.values, channel.lsb),
             Some(c) => {
                 let known = |v: &f64, c: i32| {
                     if v.is_finite() {
@@ -332,7 +333,8 @@ impl<'a> Gyro<'a> {
                     }
                 };
                 let both = channel.values.iter().zip(c);
-                Local::new(&both.map(|(v, c)| known(v, *c)).collect::<Vec<f64>>())
+                let both: Vec<f64> = both.map(|(v, c)| known(v, *c)).collect();
+                about_levels(&both, Some(1.0))
             }
         };
         let apart = counts.is_some_and(|c| !scaled(&channel.values, c));
@@ -340,13 +342,27 @@ impl<'a> Gyro<'a> {
             channel,
             counts,
             local,
-            of_readings: apart.then(|| Local::new(&channel.values)),
+            of_readings: apart.then(|| about_levels(&channel.values, channel.lsb)),
         }
     }
 
     fn known(&self, row: usize) -> bool {
         self.channel.values[row].is_finite()
     }
+}
+
+/// Neighbourhoods of readings in such steps, each at its level where there are two: a short stay is no reading far off, and beside a
+/// switch the neighbours tell of another level.
+fn about_levels(y: &[f64], step: Option<f64>) -> Local {
+    let Some(two) = TwoLevels::of(y, step.unwrap_or(0.0)) else {
+        return Local::new(y);
+    };
+    let levels = two.level(0.5 * two.distance);
+    let at_one: Vec<f64> = y.iter().zip(&levels).map(|(y, level)| y - level).collect();
+    let mut local = Local::new(&at_one);
+    let each = local.level.iter_mut().zip(&levels);
+    each.for_each(|(there, level)| *there += level);
+    local
 }
 
 /// Times of the rows, s from the first.

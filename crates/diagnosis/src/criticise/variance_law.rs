@@ -103,6 +103,7 @@ fn offer(
         }
         VarianceLaw::Segment => {
             let (lr, start, end, increase) = scan::segment(e);
+            let (start, end, increase) = scan::to_a_reading(e, (start, end, increase));
             let (n, inside) = (e.len() as f64, (end - start) as f64);
             let error =
                 (1.0 + increase) * (2.0 / inside.max(1.0) + 2.0 / (n - inside).max(1.0)).sqrt();

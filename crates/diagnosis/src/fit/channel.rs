@@ -4,10 +4,10 @@ mod path;
 
 use std::sync::Arc;
 
-use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape};
+use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape, extremes};
 
 use crate::fit::likelihood::{Noise, Panel, Solution};
-use crate::fit::scan::residual;
+use crate::fit::scan::{LOUD, residual};
 use crate::test_level::{Outcome, Worded};
 pub use path::Path;
 
@@ -362,6 +362,12 @@ impl VarianceLaws {
         self.each.is_empty()
     }
 
+    /// Whether it is many times as large in some places as in others.
+    pub fn are_loud(&self) -> bool {
+        let [least, most] = extremes(&self.product);
+        most > LOUD * least
+    }
+
     /// A residual over the square root of the variance.
     pub fn divide(&self, e: &mut [f64]) {
         divide(e, &self.product);
@@ -413,6 +419,8 @@ pub(crate) struct Joint {
     pub laws: Vec<(f64, f64)>,
     /// What was found for each term.
     pub found: Vec<Found>,
+    /// Innovations over their standard deviation, NaN where nothing was read.
+    pub innovations: Vec<f64>,
 }
 
 /// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by

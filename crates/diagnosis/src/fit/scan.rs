@@ -8,8 +8,8 @@ use rustfft::num_complex::Complex;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel, Solution};
 use numerics::transform::RealFft;
-pub(crate) use variance::levels;
-pub use variance::{ends, segment, variance_law};
+pub(crate) use variance::{LOUD, levels};
+pub use variance::{ends, of_a_stretch, segment, to_a_reading, variance_law};
 
 /// Longest grid of step times; beyond it the scan is as fine as this many places.
 const LONGEST_STEP_GRID: usize = 1 << 16;

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use model::effects::shock::LONGEST_S;
 
-use crate::fit::likelihood::{Bins, Dct};
+use crate::fit::likelihood::{Bins, Dct, Noise};
 use crate::fit::threshold;
 use crate::ingest::types::Target;
 use crate::test_level::on_two_threads;
@@ -218,14 +218,20 @@ pub(crate) fn blows(
     if targets.is_empty() || targets.iter().any(|t| t.moving) {
         return vec![];
     }
-    let readings: Vec<Vec<f64>> = targets.iter().map(|t| read(t)).collect();
-    let whitened: Vec<Vec<f64>> = (targets.iter().zip(&readings))
-        .map(|(t, y)| whitened(y, t, dct, bins))
+    let mut readings: Vec<Vec<f64>> = targets.iter().map(|t| read(t)).collect();
+    // A stay on another level is short, and none.
+    let noise = (targets.iter().zip(&mut readings)).map(|(t, y)| {
+        let own = (t.jumps.take_levels_off(y)).map(|(noise, white)| (noise, *white));
+        own.unwrap_or((&t.noise, t.white))
+    });
+    let noise: Vec<(&Noise, f64)> = noise.collect();
+    let whitened: Vec<Vec<f64>> = (noise.iter().zip(&readings))
+        .map(|(noise, y)| whitened(y, *noise, dct, bins))
         .collect();
     let changes = |place: Place, shape: Shape| {
         let felt = felt(&whitened, place, shape);
         let all = felt.iter().map(|(energy, k)| {
-            let sigma = targets[*k].white.sqrt();
+            let sigma = noise[*k].1.sqrt();
             beside_a_step(&readings[*k], sigma, place.at, shape) < SHARE * energy
         });
         all.clone().filter(|changed| *changed).count() * 2 > all.count()
@@ -325,14 +331,14 @@ fn is_single(whitened: &[Vec<f64>], place: Place, shape: Shape) -> bool {
 }
 
 /// Readings of a target as its first fit whitens them, where they are louder than elsewhere by that.
-fn whitened(y: &[f64], target: &Target, dct: &Dct, bins: &Bins) -> Vec<f64> {
+fn whitened(y: &[f64], (noise, white): (&Noise, f64), dct: &Dct, bins: &Bins) -> Vec<f64> {
     let mut c = dct.forward(y);
-    let g = target.noise.everywhere(bins);
+    let g = noise.everywhere(bins);
     c[0] = 0.0;
     c.iter_mut()
         .zip(&g)
         .skip(1)
-        .for_each(|(c, g)| *c /= (target.white * g).sqrt());
+        .for_each(|(c, g)| *c /= (white * g).sqrt());
     let mut e = dct.inverse(&c);
     let spreads: Vec<f64> = e.chunks(BLOCK).map(robust_sigma).collect();
     for (b, block) in e.chunks_mut(BLOCK).enumerate() {

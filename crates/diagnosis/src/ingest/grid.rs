@@ -8,6 +8,7 @@ mod tests;
 use std::sync::Arc;
 
 use model::effect::Signal;
+use model::effects::shock::LONGEST_S;
 use model::record::{Base, Channel, Quantity, Record};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -403,8 +404,10 @@ impl<'a> Layout<'a> {
         } = still;
         let still = motion_rms <= MOTION_RMS;
         let (dct, bins) = (&self.dct, &self.bins);
+        // A blow is not loud for longer than it rings.
+        let loud = (2.0 * LONGEST_S * self.rate_hz) as usize;
         let spikes = if still {
-            spikes(&given, &mut y, &mut c, &mut fit, dct, bins, rng)
+            spikes((&given, loud), &mut y, &mut c, &mut fit, dct, bins, rng)
         } else {
             vec![]
         };

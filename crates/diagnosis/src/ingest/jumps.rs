@@ -6,6 +6,7 @@
 //! back: whether it is a step, the search tells.
 
 mod settling;
+mod two_levels;
 
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use numerics::order_statistics::median;
 use numerics::series::white_by_differences;
 use numerics::tails;
+pub(crate) use two_levels::TwoLevels;
 
 /// Readings on either side that tell of a level, and the fewest.
 const LEVEL: usize = 16;
@@ -46,11 +48,22 @@ pub struct Jumps {
     pub(super) on_the_way: Vec<usize>,
     /// White noise and a random walk of the readings without their jumps.
     pub(super) fit: Option<(Noise, f64)>,
+    /// Whether they go between two levels.
+    two_levels: bool,
 }
 
 impl Jumps {
     /// Those of readings in steps of `step`, NaN where there is none.
     pub(super) fn of(y: &[f64], step: f64) -> Self {
+        if let Some(two) = TwoLevels::of(y, step) {
+            return Self {
+                all: two.jumps(),
+                on_the_way: two.on_the_way,
+                fit: None,
+                two_levels: true,
+                settling: None,
+            };
+        }
         let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
         let sigma = white_by_differences(&known).sqrt().max(0.5 * step);
         // What settles fast jumps as well, until it is taken off.
@@ -109,6 +122,14 @@ impl Jumps {
     /// Whether there are none.
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty() && self.settling.is_none()
+    }
+
+    /// Takes two levels off readings, and gives white noise and a random walk of what that leaves; nothing of other jumps, which may be
+    /// a part of what is asked.
+    pub(super) fn take_levels_off(&self, y: &mut [f64]) -> Option<&(Noise, f64)> {
+        let fit = self.fit.as_ref().filter(|_| self.two_levels)?;
+        self.add(y, -1.0);
+        Some(fit)
     }
 
     /// Readings at one level, those on the way left out.

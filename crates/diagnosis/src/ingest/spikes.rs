@@ -6,11 +6,47 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::ingest::kalman;
+use numerics::order_statistics::median;
+use numerics::tails;
+
+/// Fewest readings that tell how loud it is about them, and how many such stretches a record has at most.
+const LEAST_STRETCH: usize = 100;
+const MOST_STRETCHES: usize = 240;
+/// Spread over that of the channel from which on a stretch is loud: six standard errors of the shortest one.
+const LOUD: f64 = 1.5;
+
+/// How loud it is about each reading: the spread there over that of the channel where it is clearly more. Single readings do not
+/// move it.
+fn loudness(e: &[f64], given: &[f64], least: usize) -> Vec<f64> {
+    let length = LEAST_STRETCH.max(least).max(e.len() / MOST_STRETCHES);
+    let spread = |range: std::ops::Range<usize>| {
+        let known = range.filter(|i| given[*i].is_finite());
+        let sizes: Vec<f64> = known.map(|i| e[i].abs()).collect();
+        if sizes.len() < LEAST_STRETCH {
+            return 1.0;
+        }
+        median(&sizes) / tails::MEDIAN.sqrt()
+    };
+    let starts = (0..e.len()).step_by(length);
+    let spreads: Vec<f64> = starts
+        .map(|i| spread(i..(i + length).min(e.len())))
+        .collect();
+    // It may begin or end anywhere in the next one.
+    let about = |b: usize| {
+        let near = &spreads[b.saturating_sub(1)..(b + 2).min(spreads.len())];
+        near.iter().copied().fold(0.0, f64::max)
+    };
+    let all: Vec<f64> = (0..spreads.len())
+        .map(about)
+        .map(|s| if s > LOUD { s } else { 1.0 })
+        .collect();
+    (0..e.len()).map(|i| all[i / length]).collect()
+}
 
 /// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
-/// widens the noise that the others are held against.
+/// widens the noise that the others are held against. What is loud for longer than `least` readings has no singles for that.
 pub(super) fn spikes(
-    given: &[f64],
+    (given, least): (&[f64], usize),
     y: &mut Vec<f64>,
     coefficients: &mut Arc<Vec<f64>>,
     fit: &mut (Noise, f64),
@@ -29,9 +65,10 @@ pub(super) fn spikes(
             .map(|(c, g)| c / (fit.1 * g).sqrt())
             .collect();
         let e = dct.inverse(&c);
+        let loud = loudness(&e, given, least);
         let beyond = |limit: f64| {
             (0..n)
-                .filter(|i| e[*i].abs() > limit && given[*i].is_finite())
+                .filter(|i| e[*i].abs() > limit * loud[*i] && given[*i].is_finite())
                 .collect::<Vec<_>>()
         };
         let fresh: Vec<usize> = beyond(spike_limit(n))
@@ -58,8 +95,7 @@ pub(super) fn spikes(
 
 /// Distance in sigma that one of `n` samples reaches once in 10^5 records.
 pub(crate) fn spike_limit(n: usize) -> f64 {
-    let tail = |z: f64| {
-        (n as f64 * numerics::tails::normal_tail(z)).ln() - crate::test_level::omnibus_level().ln()
-    };
+    let tail =
+        |z: f64| (n as f64 * tails::normal_tail(z)).ln() - crate::test_level::omnibus_level().ln();
     numerics::minimise::golden(&|z| tail(z).abs(), 4.0, 12.0, 40)
 }

@@ -96,8 +96,46 @@ impl<'a> Series<'a> {
         self.count as f64 - 1.0
     }
 
+    /// Innovations of what the columns leave, over their standard deviation; NaN where nothing was read, and of the first reading.
+    pub(super) fn innovations(&self, at: &Point) -> Vec<f64> {
+        let (normal, log_det) = self.through(at);
+        let solution = normal.solved(self.free(), log_det);
+        let white = solution.white.sqrt();
+        let mut all = vec![f64::NAN; self.read.len()];
+        self.each(at, |i, nu, s| {
+            let explained = nu[1..].iter().zip(&solution.beta).map(|(x, b)| x * b);
+            all[i] = (nu[0] - explained.sum::<f64>()) / (white * s.sqrt());
+        });
+        all
+    }
+
     /// Sums of products of the innovations over their variances, and the sum of the logarithms of these.
     pub(super) fn through(&self, at: &Point) -> (Normal, f64) {
+        let w = self.width;
+        let mut sums = vec![0.0; w * w];
+        let (mut logs, mut product) = (0.0, 1.0f64);
+        self.each(at, |_, nu, s| {
+            for (i, a) in nu.iter().enumerate() {
+                let by = a / s;
+                let sums = &mut sums[i * w..(i + 1) * w];
+                sums[i..]
+                    .iter_mut()
+                    .zip(&nu[i..])
+                    .for_each(|(sum, b)| *sum += by * b);
+            }
+            // A logarithm for many: their product stays within the numbers.
+            product *= s;
+            if !(1e-200..1e200).contains(&product) {
+                logs += product.ln();
+                product = 1.0;
+            }
+        });
+        (normal(&sums, w), logs + product.ln())
+    }
+
+    /// Goes through the readings but the first: its place, the innovations of every series, their variance over the white one.
+    #[inline]
+    fn each(&self, at: &Point, mut seen: impl FnMut(usize, &[f64], f64)) {
         let (w, d) = (self.width, 1 + at.poles.len());
         let (step, white) = (at.log_walk.exp(), self.white(at));
         let mut p = vec![0.0; d * d];
@@ -107,8 +145,7 @@ impl<'a> Series<'a> {
         }
         // State by component: that of every series.
         let mut state = vec![0.0; d * w];
-        let (mut sums, mut nu, mut row_sums) = (vec![0.0; w * w], vec![0.0; w], vec![0.0; d]);
-        let (mut logs, mut product) = (0.0, 1.0f64);
+        let (mut nu, mut row_sums) = (vec![0.0; w], vec![0.0; d]);
         let mut begun = false;
         let rows = self.values.chunks_exact(w).zip(&white).zip(&self.read);
         for (i, ((row, white), read)) in rows.enumerate() {
@@ -130,24 +167,10 @@ impl<'a> Series<'a> {
             }
             correct(&mut p, &mut state, (&row_sums, s), &nu);
             if begun {
-                for (i, a) in nu.iter().enumerate() {
-                    let by = a / s;
-                    let sums = &mut sums[i * w..(i + 1) * w];
-                    sums[i..]
-                        .iter_mut()
-                        .zip(&nu[i..])
-                        .for_each(|(sum, b)| *sum += by * b);
-                }
-                // A logarithm for many: their product stays within the numbers.
-                product *= s;
-                if !(1e-200..1e200).contains(&product) {
-                    logs += product.ln();
-                    product = 1.0;
-                }
+                seen(i, &nu, s);
             }
             begun = true;
         }
-        (normal(&sums, w), logs + product.ln())
     }
 }
 

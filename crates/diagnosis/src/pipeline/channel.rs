@@ -77,8 +77,9 @@ pub(super) fn all_searched(grid: &Grid, between: bool) -> Vec<Searched<'_>> {
 /// with a random walk of `log_walk`, the logarithm of its step variance over the white one, where it has a smaller one.
 pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
     let search = laid_out(grid, target);
-    let found = search.ascend(search.baseline(&target.noise));
-    let best = search.beside_any_spectrum(found);
+    let baseline = search.baseline(&target.noise);
+    let found = search.beside_any_spectrum(search.ascend(baseline.clone()));
+    let best = search.beside_a_stretch(found, &baseline);
     let walking = Noise {
         log_walk: best.noise.log_walk.max(log_walk),
         terms: best.noise.terms.clone(),
@@ -86,7 +87,7 @@ pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
     let panel = &search.panel;
     let other = panel.solve(&walking.over(&panel.bins), &best.columns());
     let lost = best.solution.log_likelihood - other.log_likelihood;
-    (Search::total(&best), 2.0 * lost)
+    (search.total_beside_a_stretch(&best), 2.0 * lost)
 }
 
 /// Searches a channel, and asks its model and what that leaves.
@@ -106,11 +107,11 @@ fn searched_from<'a>(
     let explained = || {
         let baseline = search.baseline(&target.noise);
         let ascended = if between {
-            search.ascend(search.beside_any_spectrum(baseline))
+            search.ascend(search.beside_any_spectrum(baseline.clone()))
         } else {
-            search.beside_any_spectrum(search.ascend(baseline))
+            search.beside_any_spectrum(search.ascend(baseline.clone()))
         };
-        compare::hold(&search, ascended)
+        compare::hold(&search, search.beside_a_stretch(ascended, &baseline))
     };
     let explained = search.beside_tracked_tones(explained(), &explained);
     let mut state = search.conclude(explained);
@@ -177,6 +178,14 @@ fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
         }
     }
     laws.divide(&mut s.e);
+    if let Some(joint) = s.joint.as_ref().filter(|_| laws.are_loud()) {
+        // What is whitened by a spectrum is not white where the noise is another one; by the filter it is.
+        let own = s.e.iter_mut().zip(&joint.innovations);
+        own.filter(|(_, own)| own.is_finite())
+            .for_each(|(e, own)| *e = *own);
+        s.u = s.search.panel.dct.forward(&s.e);
+        s.u[0] = 0.0;
+    }
     s.variance = laws;
 }
 

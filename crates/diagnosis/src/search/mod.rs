@@ -17,6 +17,7 @@ mod refine;
 mod rivals;
 mod score;
 pub(crate) mod searched;
+mod stretch;
 mod tracked;
 
 use std::cell::RefCell;

@@ -5,6 +5,7 @@
 
 mod dwell_times;
 mod level;
+mod plain;
 mod steps;
 
 use std::f64::consts::TAU;
@@ -12,9 +13,9 @@ use std::sync::Arc;
 
 use model::effect::{Covariance, Effect, Hypothesis};
 
-use crate::fit::channel::{Form, Note, State, Term};
-use crate::fit::likelihood::{Bins, Dct, Noise, Panel, least_walk};
-use crate::fit::scan::residual;
+use crate::fit::channel::{Form, Note, State, Term, by_model};
+use crate::fit::likelihood::{Bins, Dct, Noise, Panel, Solution, least_walk};
+use crate::fit::scan::{self, residual};
 use crate::fit::threshold;
 use crate::search::Search;
 use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
@@ -99,6 +100,7 @@ fn looks_two_level(search: &Search<'_>, state: &State) -> bool {
     let excess = (variance - white).max(0.05 * white);
     let (two, _) = fitted(&blocks, white, excess, &[(0.9, 10.0), (0.7, 40.0)], 100);
     let gaussian = walk.log_likelihood - 0.5 * (m - 1) as f64 * (1.0 + TAU.ln());
+    let gaussian = gaussian + of_a_stretch(&panel, &[], (&noise, &walk));
     two - gaussian > MARGIN
 }
 
@@ -147,6 +149,10 @@ pub fn hold(search: &Search<'_>, state: State) -> State {
     // The data without the terms that are not contested.
     let kept = state.terms.iter().filter(|t| !contested(t));
     let kept: Vec<Term> = kept.cloned().collect();
+    let process = stationary(search).map(|(_, _, process)| process);
+    if let Some(plain) = plain::hold(search, &state, &kept, (at, candidate.effect), process) {
+        return plain;
+    }
     let asked = contest.is_on()
         || looks_two_level(search, &search.refit(kept.clone(), state.noise.log_walk));
     if !asked {
@@ -226,7 +232,15 @@ fn gaussian(panel: &Panel, terms: Processes, columns: &[usize]) -> (f64, Noise, 
     let (noise, solution) = panel.fit(&noise, columns);
     let count = (panel.bins.n - 1) as f64;
     let l = solution.log_likelihood - 0.5 * count * (1.0 + TAU.ln());
+    let l = l + of_a_stretch(panel, columns, (&noise, &solution));
     (l, noise, solution.white)
+}
+
+/// Nats that noise gains by being much louder for a while: to levels it is what it is not to a noise that is the same throughout.
+fn of_a_stretch(panel: &Panel, columns: &[usize], (noise, solution): (&Noise, &Solution)) -> f64 {
+    let r = residual(panel, columns, solution);
+    let (_, e) = by_model(panel, &r, noise, solution.white);
+    scan::of_a_stretch(&e)
 }
 
 /// Samples of a block. A process that is fast for a long record is weighed on a stretch of it, in blocks that still show it;

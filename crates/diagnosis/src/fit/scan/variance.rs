@@ -2,13 +2,20 @@
 
 use model::effect::extremes;
 
+use crate::fit::threshold;
+
 /// Levels that the shape of a variance is divided into.
 const LEVELS: usize = 4096;
+
+/// Blocks by which a stretch of another variance is sought among so many readings.
+fn blocks_of(readings: usize) -> usize {
+    240.min(readings / 8).max(2)
+}
 
 /// A stretch of larger (or smaller) variance of unit-variance residuals: (LR, start, end, increase).
 #[must_use]
 pub fn segment(u: &[f64]) -> (f64, usize, usize, f64) {
-    let blocks = 240.min(u.len() / 8).max(2);
+    let blocks = blocks_of(u.len());
     let edge = |b: usize| b * u.len() / blocks;
     let mut sums = vec![0.0];
     for b in 0..blocks {
@@ -39,6 +46,57 @@ pub fn segment(u: &[f64]) -> (f64, usize, usize, f64) {
         }
     }
     best
+}
+
+/// Variance over that outside from which on a stretch is loud, or one over that: of noise that is the same throughout the spectrum is
+/// known by so many readings; of a short loud part by no more than it has.
+pub(crate) const LOUD: f64 = 4.0;
+
+/// Nats that unit-variance residuals gain by a loud, or quiet, stretch; 0 where there is none.
+#[must_use]
+pub fn of_a_stretch(u: &[f64]) -> f64 {
+    let (lr, _, _, increase) = segment(u);
+    let ratio = 1.0 + increase;
+    if ratio.max(ratio.recip()) < LOUD {
+        return 0.0;
+    }
+    (0.5 * (lr - threshold::segment())).max(0.0)
+}
+
+/// Rounds in which the ends of a stretch are settled.
+const ROUNDS: usize = 3;
+
+/// A stretch that was found between blocks, start, end and increase, to a reading where these tell its ends better than blocks do: of
+/// readings that are many times as loud, those of half a block beside it would be the largest that are left.
+#[must_use]
+pub fn to_a_reading(u: &[f64], (start, end, increase): (usize, usize, f64)) -> (usize, usize, f64) {
+    let block = u.len() as f64 / blocks_of(u.len()) as f64;
+    let mean = |part: &mut dyn Iterator<Item = &f64>| {
+        let (sum, count) = part.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+        sum / f64::max(count, 1.0)
+    };
+    let mut told = (start, end, increase);
+    for _ in 0..ROUNDS {
+        let (first, last) = ends(u, told.0, told.1, told.2);
+        let settled = |(at, error): (f64, f64), before: usize| {
+            if error < 0.25 * block {
+                at.round() as usize
+            } else {
+                before
+            }
+        };
+        let (start, end) = (settled(first, told.0), settled(last, told.1).min(u.len()));
+        if end <= start {
+            return told;
+        }
+        let inside = mean(&mut u[start..end].iter());
+        let outside = mean(&mut u[..start].iter().chain(&u[end..]));
+        if (start, end) == (told.0, told.1) || outside <= 0.0 {
+            return told;
+        }
+        told = (start, end, inside / outside - 1.0);
+    }
+    told
 }
 
 /// Start and end of a stretch of other variance, in samples, with their standard errors: each one averaged over all

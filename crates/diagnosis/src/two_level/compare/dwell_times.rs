@@ -61,21 +61,31 @@ pub(super) fn at_random(y: &[f64], x: &Coordinates, block_s: f64) -> Option<Outc
         let middle = mean(&scores, |z| z);
         z = (z - middle) / mean(&scores, |z| (z - middle).powi(2)).sqrt();
     }
+    Some(claim(z, &found, block_s))
+}
+
+/// The same of levels that every place tells, whether it lies on the `upper` one, each of `place_s` seconds: no stay is too short.
+pub(super) fn of_stays(upper: &[bool], place_s: f64) -> Option<Outcome> {
+    let found = dwells(upper);
+    score(&found).map(|z| claim(z, &found, place_s))
+}
+
+fn claim(z: f64, found: &[Vec<f64>; 2], block_s: f64) -> Outcome {
     let seconds = |d: &[f64]| match d.len() {
         0 => "none".to_owned(),
         count => format!("{count} of {:.1} s", mean(d, |v| v) * block_s),
     };
-    Some(Outcome {
+    Outcome {
         id: CheckId::ProcessDwells,
         about: vec![],
         statistic: z,
-        p_value: chance(z),
+        p_value: Normal::standard().cdf(z),
         what: format!(
             "told as telegraph: it switches more regularly than at random, stays above ({}) and below ({}) are each much alike",
             seconds(&found[0]),
             seconds(&found[1])
         ),
-    })
+    }
 }
 
 #[cfg(test)]
