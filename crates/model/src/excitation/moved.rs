@@ -44,6 +44,10 @@ pub(crate) struct Moved {
 /// Standard deviations beyond which two readings near each other are no noise about the slow part of a motion. By chance that is
 /// one pair in a hundred runs of ten minutes, which are then replayed as they were read.
 const FAR: f64 = 3.5;
+/// As many of means over readings next to each other. By chance that is one in twenty runs of ten minutes.
+const FAR_MEAN: f64 = 4.5;
+/// Half of a normal distribution lies within so much of its standard deviation.
+const NORMAL_MEDIAN: f64 = 0.674_5;
 /// As many of second differences, one by one.
 const FAR_BEND: f64 = 6.0;
 
@@ -73,8 +77,9 @@ fn white(values: &[f64]) -> (f64, usize) {
     let bends: Vec<f64> = bends.filter(|b| b.is_finite()).collect();
     let mut sizes: Vec<f64> = bends.iter().map(|b| b.abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    // Half of a normal distribution lies within so much of its standard deviation.
-    let sigma = sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745);
+    let sigma = sizes
+        .get(sizes.len() / 2)
+        .map_or(0.0, |m| m / NORMAL_MEDIAN);
     let near = bends
         .iter()
         .filter(|b| sigma == 0.0 || b.abs() <= FAR_BEND * sigma);
@@ -130,7 +135,7 @@ pub(crate) fn moved_like(
 }
 
 /// The motion in what was read: what is slower than about 1 Hz, and where a motion begins or ends faster than that, which several
-/// readings near each other show, all of it.
+/// readings near each other show, or their means, all of it.
 fn motion(values: &[f64], rate_hz: f64) -> Vec<f64> {
     let mut motion = slow(values, rate_hz);
     let far = FAR * white(values).0;
@@ -141,7 +146,27 @@ fn motion(values: &[f64], rate_hz: f64) -> Vec<f64> {
         let around = pair[0].saturating_sub(reach)..(pair[1] + reach).min(values.len());
         motion[around.clone()].copy_from_slice(&values[around]);
     }
+    for half in [reach / 4, reach / 2] {
+        for i in bent(values, &motion, half) {
+            let around = i.saturating_sub(reach)..(i + reach).min(values.len());
+            motion[around.clone()].copy_from_slice(&values[around]);
+        }
+    }
     motion
+}
+
+/// Places about which the mean over `half` readings to either side is off the motion by more than noise makes of it.
+fn bent(values: &[f64], motion: &[f64], half: usize) -> Vec<usize> {
+    let rest: Vec<f64> = values.iter().zip(motion).map(|(v, m)| v - m).collect();
+    let rest = means(&rest, half);
+    let mut sizes: Vec<f64> = rest.iter().map(|r| r.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let far = sizes
+        .get(sizes.len() / 2)
+        .map_or(0.0, |m| FAR_MEAN * m / NORMAL_MEDIAN);
+    (0..rest.len())
+        .filter(|i| far > 0.0 && rest[*i].abs() > far)
+        .collect()
 }
 
 /// Samples of a third of a block.
