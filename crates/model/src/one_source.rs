@@ -240,13 +240,16 @@ fn read_from(all: &[Read<'_>], omega: f64, half_width: f64) -> (Vec<[f64; 2]>, f
         at = back.next(at, *z);
         *z = at;
     }
-    // What is known of a variance of 1 it has in this record.
+    // What is known of a variance of 1 it has in this record, in either quadrature: what a wide filter has of the negative frequencies
+    // adds to one and takes from the other.
     let known = (ratio - 1.0) / ratio;
-    let squares = turning.iter().map(|z| z[0] * z[0] + z[1] * z[1]);
-    let found = 0.5 * squares.sum::<f64>() / turning.len().max(1) as f64;
-    let scale = (known / found.max(f64::MIN_POSITIVE)).sqrt();
+    let scale = [0, 1].map(|part| {
+        let squares = turning.iter().map(|z| z[part] * z[part]);
+        let found = squares.sum::<f64>() / turning.len().max(1) as f64;
+        (known / found.max(f64::MIN_POSITIVE)).sqrt()
+    });
     for z in &mut turning {
-        *z = z.map(|v| scale * v);
+        *z = [scale[0] * z[0], scale[1] * z[1]];
     }
     (turning, known)
 }
