@@ -311,8 +311,13 @@ impl Search<'_> {
                     let source = moves[number]
                         .as_ref()
                         .and_then(|own| band_source::claim(own, self.view.signals, &felt, named));
+                    // A tone that accelerometers read is a motion of the stand, harmonics and all.
+                    let is_motion = t.candidate == tone
+                        && (moves[number].as_ref())
+                            .is_some_and(|own| band_source::is_read(own, self.view.signals, &felt));
                     let alone = moves[number]
                         .as_ref()
+                        .filter(|_| !is_motion)
                         .and_then(|own| band_alone::claim(own, &others, &harmonics, named));
                     t.claims.extend(source.into_iter().chain(alone));
                 }
