@@ -133,6 +133,7 @@ type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
 fn channels_of(hypothesis: &Hypothesis) -> Vec<String> {
     let follows = match hypothesis {
         Hypothesis::Regression(r) => r.follows.as_deref(),
+        Hypothesis::Shaped(s) => s.follows(),
         _ => None,
     };
     let names = follows.into_iter().flat_map(|f| f.split(", "));

@@ -101,9 +101,19 @@ impl Search<'_> {
     }
 
     /// Add a term, in place of the one that it extends.
-    pub(crate) fn accept(&self, state: &State, term: Term) -> State {
-        let mut term = self.refine(state, self.stripped(state, term));
-        let mut terms = state.terms.clone();
+    pub(crate) fn accept(&self, state: &State, mut term: Term) -> State {
+        let mut beside = state.clone();
+        if let Form::Shaped(shape, _) = &term.form {
+            let replaced = Self::replaced(state, term.effect.id(), shape.as_ref());
+            if !replaced.is_empty() {
+                beside.terms.retain(|t| !replaced.contains(&t.candidate));
+                // Later it is weighed as a whole.
+                let of = &self.candidates[term.candidate];
+                term.threshold = of.limit_of_shape(term.names.len());
+            }
+        }
+        let mut term = self.refine(&beside, self.stripped(&beside, term));
+        let mut terms = beside.terms;
         if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {
             // Later it is weighed as a whole.
             term.threshold = threshold::regression(term.columns.len(), 1);
