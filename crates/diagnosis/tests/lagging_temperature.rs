@@ -12,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const RUNS: u64 = 24;
+/// A share of 0.89 (64 of 72 draws of three other seeds) misses this in 2 %.
 const LEAST: u64 = 18;
 const ROWS: usize = 24_000;
 /// Root of twice the likelihood ratio in white noise: of the whole response, and the least of what the lag changes of it.
@@ -123,6 +124,7 @@ impl Course {
 
 /// A bias that follows a temperature, late or early.
 #[derive(Debug)]
+#[expect(dead_code, reason = "a draw that fails tells all that it was")]
 struct Lagging {
     rate_hz: f64,
     sigma: f64,
@@ -138,13 +140,13 @@ struct Lagging {
     of_lag: f64,
 }
 
-struct Drawn {
+struct Draw {
     of: Lagging,
     felt: Vec<f64>,
     read: Vec<f64>,
 }
 
-impl Drawn {
+impl Draw {
     /// One that shows its lag.
     fn drawn(rng: &mut Xoshiro256PlusPlus) -> Self {
         loop {
@@ -249,7 +251,7 @@ fn a_bias_behind_or_ahead_of_its_thermometer_is_one_entry_with_its_slope_and_its
     let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_129);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
-        let drawn = Drawn::drawn(&mut rng);
+        let drawn = Draw::drawn(&mut rng);
         let record = drawn.record(&mut rng);
         let told = diagnose(&record, &DiagnoseOptions::default());
         drawn.of.wrong(&told.expect("a diagnosis").diagnosis)

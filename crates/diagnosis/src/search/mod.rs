@@ -461,7 +461,7 @@ impl<'a> Search<'a> {
                 c.effect.id() != channel::ID
             }
         };
-        let mut rest = self.without(state, i);
+        let mut rest = self.cleared_of(state, i);
         for others in 0..=3 {
             if others > 0 {
                 let offer = Self::simplest_best(self.offers(&rest, &allow));

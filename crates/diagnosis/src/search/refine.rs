@@ -129,6 +129,20 @@ impl Search<'_> {
         self.refit(self.placed(state, terms), state.noise.log_walk)
     }
 
+    /// The state without a term and without every shape that follows the same channel: beside the term it took the place that was
+    /// left, and is sought anew.
+    pub(super) fn cleared_of(&self, state: &State, i: usize) -> State {
+        let of = &state.terms[i].of;
+        let own = |t: &Term| {
+            let whole = matches!(&t.form, Form::Shaped(shape, _) if shape.whole());
+            whole && t.of.iter().any(|c| of.contains(c))
+        };
+        let each = state.terms.iter().enumerate();
+        let kept = each.filter(|(j, t)| *j != i && !own(t));
+        let kept = kept.map(|(_, t)| t.clone()).collect();
+        self.refit(kept, state.noise.log_walk)
+    }
+
     /// Terms of which every shape but the last, which is new, has its best place beside the others.
     fn placed(&self, state: &State, terms: Vec<Term>) -> Vec<Term> {
         let mut beside = State {
