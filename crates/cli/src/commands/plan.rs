@@ -25,10 +25,10 @@ pub struct Arguments {
     model: Option<PathBuf>,
     /// How well something is wanted, 95 %: `"K within 20 %"` (of N, B, K, Q, R) or `"angle within 2 deg after 600 s"`;
     /// several separated by commas
-    #[arg(long, value_name = "TERM within X %")]
+    #[arg(long, value_name = "TERM within X %", value_parser = want, required_unless_present = "separate")]
     want: Option<String>,
     /// Two causes to be told apart: `temperature,rate_ramp`
-    #[arg(long, value_name = "CAUSE,CAUSE")]
+    #[arg(long, value_name = "CAUSE,CAUSE", value_parser = separate)]
     separate: Option<String>,
     /// The gyro, where there are several
     #[arg(long, value_name = "NAME")]
@@ -45,6 +45,42 @@ pub struct Arguments {
     json: Option<PathBuf>,
     #[command(flatten)]
     input: Input,
+}
+
+/// A wish that is understood.
+fn want(text: &str) -> std::result::Result<String, String> {
+    let want = Some(text);
+    understood(
+        text,
+        &Request {
+            want,
+            ..Request::default()
+        },
+    )
+}
+
+/// Two causes that there are.
+fn separate(text: &str) -> std::result::Result<String, String> {
+    let separate = Some(text);
+    understood(
+        text,
+        &Request {
+            separate,
+            ..Request::default()
+        },
+    )
+}
+
+fn understood(text: &str, request: &Request<'_>) -> std::result::Result<String, String> {
+    match request.check_words() {
+        Ok(()) => Ok(text.to_owned()),
+        Err(error) => Err(format!(
+            "{error}; {}",
+            error
+                .help()
+                .map_or_else(String::new, |help| help.to_string())
+        )),
+    }
 }
 
 /// Runs it.
