@@ -33,7 +33,7 @@ fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
         assert!(said.contains("has to be"), "{line}: {said}");
     }
     for (words, what) in [
-        (vec!["plan"], "--want"),
+        (vec!["plan"], "--separate <CAUSE,CAUSE>"),
         (vec!["plan", "--want", "Z within 20 %"], "K within 20 %"),
         (
             vec!["plan", "--separate", "temperature"],

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use imu_stand::plan::{
     Noise, Plan, Request, SEQUENCES, Told, Z_95, lengths, of_model, of_record, plan,
 };
@@ -17,6 +17,7 @@ use super::{Input, Outputs};
 
 /// What `plan` takes.
 #[derive(Args)]
+#[command(group(ArgGroup::new("answer").required(true).multiple(true).args(["want", "separate"])))]
 pub struct Arguments {
     /// A capture whose noise is the present knowledge; without it and without --model the paper's figures
     capture: Option<PathBuf>,
@@ -25,7 +26,7 @@ pub struct Arguments {
     model: Option<PathBuf>,
     /// How well something is wanted, 95 %: `"K within 20 %"` (of N, B, K, Q, R) or `"angle within 2 deg after 600 s"`;
     /// several separated by commas
-    #[arg(long, value_name = "TERM within X %", value_parser = want, required_unless_present = "separate")]
+    #[arg(long, value_name = "TERM within X %", value_parser = want)]
     want: Option<String>,
     /// Two causes to be told apart: `temperature,rate_ramp`
     #[arg(long, value_name = "CAUSE,CAUSE", value_parser = separate)]

@@ -209,8 +209,7 @@ fn what_is_left_open_is_said_with_the_experiment_that_decides() {
 fn a_count_and_its_interval_are_whole_numbers() {
     let of = |value: f64, error: Option<f64>| {
         let f = finding("stale_samples", &[("count", value, error, "1")]);
-        let said = (headline(&f).replace('\u{a0}', " "), brief(&f));
-        said
+        (headline(&f).replace('\u{a0}', " "), brief(&f))
     };
     let (line, short) = of(1774.0, Some(0.0172));
     assert!(line.ends_with(", count 1774"), "{line}");
