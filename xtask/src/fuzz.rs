@@ -25,6 +25,9 @@ struct Plan {
     stable: bool,
 }
 
+/// Options that take a value.
+const VALUED: [&str; 3] = ["--minutes", "--seed", "--target"];
+
 fn plan(arguments: &[String]) -> Result<Plan, Failure> {
     let wrong = |what: &str| Failure::new(&format!("`cargo xtask fuzz`: {what}"), HELP);
     let mut plan = Plan {
@@ -38,6 +41,9 @@ fn plan(arguments: &[String]) -> Result<Plan, Failure> {
         if word == "--stable" {
             plan.stable = true;
             continue;
+        }
+        if !VALUED.contains(&word.as_str()) {
+            return Err(wrong(&format!("it knows no {word}")));
         }
         let value = words.next();
         let value = value.ok_or_else(|| wrong(&format!("{word} takes a value")))?;
@@ -189,5 +195,16 @@ mod tests {
                 "{target}"
             );
         }
+    }
+
+    #[test]
+    fn an_option_that_there_is_not_is_named() {
+        let said = |words: &[&str]| {
+            let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+            plan(&words).err().map(|failure| failure.to_string())
+        };
+        assert!(said(&["--nix"]).is_some_and(|said| said.contains("it knows no --nix")));
+        assert!(said(&["--seed"]).is_some_and(|said| said.contains("--seed takes a value")));
+        assert_eq!(said(&["--minutes", "2"]), None);
     }
 }

@@ -83,8 +83,15 @@ fn main() -> ExitCode {
         Some("page") => page::page(&root).map(|said| println!("{said}")),
         Some("wheel") => wheel::wheel(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("compare-peers") => peers::compare(&root, std::env::args().any(|a| a == "--long")),
-        _ => {
+        Some("help" | "--help" | "-h") => {
+            println!("{USAGE}");
+            return ExitCode::SUCCESS;
+        }
+        other => {
             eprintln!("{USAGE}");
+            if let Some(other) = other {
+                eprintln!("\nerror: there is no command {other}");
+            }
             return ExitCode::from(2);
         }
     };

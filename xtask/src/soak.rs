@@ -16,6 +16,9 @@ struct Plan {
     only: Option<String>,
 }
 
+/// Options that take a value.
+const VALUED: [&str; 4] = ["--hours", "--minutes", "--seed", "--only"];
+
 fn plan(arguments: &[String]) -> Result<Plan, Failure> {
     let wrong = |what: &str| Failure::new(&format!("`cargo xtask soak`: {what}"), HELP);
     let mut plan = Plan {
@@ -29,6 +32,9 @@ fn plan(arguments: &[String]) -> Result<Plan, Failure> {
         if word == "--quick" {
             (plan.hours, plan.minutes) = (30.0, 1.0);
             continue;
+        }
+        if !VALUED.contains(&word.as_str()) {
+            return Err(wrong(&format!("it knows no {word}")));
         }
         let value = words.next();
         let value = value.ok_or_else(|| wrong(&format!("{word} takes a value")))?;
@@ -108,5 +114,16 @@ mod tests {
         ] {
             assert!(of(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn an_option_that_there_is_not_is_named() {
+        let said = |words: &[&str]| {
+            let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+            plan(&words).err().map(|failure| failure.to_string())
+        };
+        assert!(said(&["--nix"]).is_some_and(|said| said.contains("it knows no --nix")));
+        assert!(said(&["--seed"]).is_some_and(|said| said.contains("--seed takes a value")));
+        assert_eq!(said(&["--minutes", "2"]), None);
     }
 }

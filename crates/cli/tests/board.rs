@@ -94,6 +94,14 @@ fn a_rate_that_the_line_cannot_carry_is_refused_before_it_is_set() {
     let board = Board::start();
     let refused = board.ask(&["set", "rate", "256"]);
     assert_refused(&refused, &["set baud 250000"]);
+    for beyond in ["0.5", "1000", "nan"] {
+        let refused = board.ask(&["set", "rate", beyond]);
+        assert_refused(&refused, &["1 to 256 Hz, not at"]);
+    }
+    // What the line would carry is what is proposed.
+    let refused = board.ask(&["set", "baud", "9600"]);
+    let said = assert_refused(&refused, &["9600 baud do not carry", "set rate "]);
+    assert!(!said.contains("set rate 20"), "{said}");
     let said = assert_success(&board.ask(&["set", "baud", "250000"]));
     assert!(said.contains("--baud 250000"), "{said}");
     assert_success(&board.ask(&["set", "rate", "250"]));
@@ -395,4 +403,24 @@ fn a_slow_board_is_waited_for() {
     assert!(said.contains("gyro z passed"), "{said}");
     let said = assert_success(&board.ask(&["bias-null", "--samples", "8"]));
     assert!(!said.contains("reply was lost"), "{said}");
+}
+
+#[test]
+fn the_correction_that_is_stored_is_told_with_the_set_up() {
+    let board = Board::start();
+    let folder = folder("board_correction");
+    let [model, out] = ["model.toml", "info.json"].map(|name| folder.join(name));
+    std::fs::write(&model, model::ModelFile::paper().to_toml()).expect("a file");
+    let [model, out] = [&model, &out].map(|path| path.to_str().expect("a name"));
+    let said = assert_success(&board.ask(&["info", "--json", out]));
+    assert!(!said.contains("correction"), "{said}");
+    assert!(json(out.as_ref())["correction"].is_null());
+    let written = assert_success(&board.ask(&["correct", "--model", model]));
+    let said = assert_success(&board.ask(&["info", "--json", out]));
+    let number = json(out.as_ref())["correction"].as_u64().expect("a number");
+    let number = format!("{number:#06x}");
+    assert!(
+        written.contains(&number) && said.contains(&number),
+        "{written}{said}"
+    );
 }

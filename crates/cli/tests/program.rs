@@ -32,6 +32,23 @@ fn wrong_usage_exits_2_and_a_missing_file_1_with_what_to_do() {
         assert_eq!(wrong.status.code(), Some(2), "{line}");
         assert!(said.contains("has to be"), "{line}: {said}");
     }
+    for (words, what) in [
+        (vec!["plan"], "--separate <CAUSE,CAUSE>"),
+        (vec!["plan", "--want", "Z within 20 %"], "K within 20 %"),
+        (
+            vec!["plan", "--separate", "temperature"],
+            "is not two causes",
+        ),
+        (
+            vec!["plan", "--separate", "temperature,foo"],
+            "`foo` is no cause",
+        ),
+    ] {
+        let wrong = run(&words);
+        let said = String::from_utf8_lossy(&wrong.stderr);
+        assert_eq!(wrong.status.code(), Some(2), "{words:?}");
+        assert!(said.contains(what), "{words:?}: {said}");
+    }
     let missing = run(&["analyze", "no-such-file.csv"]);
     assert_eq!(missing.status.code(), Some(1));
     let said = String::from_utf8_lossy(&missing.stderr);
@@ -393,4 +410,52 @@ fn a_rate_that_was_worked_out_is_said_as_a_person_writes_it() {
     let made = run(&["simulate", "--seconds", "60", rate, "--out", out]);
     let said = String::from_utf8_lossy(&made.stdout);
     assert!(said.contains("1200 rows at 20 Hz, seed 1"), "{said}");
+}
+
+#[test]
+fn a_model_file_without_a_channel_is_refused() {
+    let folder = folder("no_channel");
+    let model = folder.join("model.toml");
+    let cut = "format = \"imu-stand-model/1\"\nstand = \"cut off\"\nrate_hz = 20.0\n";
+    std::fs::write(&model, cut).expect("a file");
+    let out = folder.join("run.csv");
+    let [model, out] = [&model, &out].map(|path| path.to_str().expect("a name"));
+    let refused = run(&[
+        "simulate",
+        "--model",
+        model,
+        "--seconds",
+        "60",
+        "--out",
+        out,
+    ]);
+    common::assert_refused(&refused, &["model.toml", "no [[channel]]", "copied whole"]);
+    assert!(!Path::new(out).exists());
+}
+
+#[test]
+fn results_and_models_are_no_captures_and_a_capture_is_no_model() {
+    let folder = folder("no_captures");
+    let [run_csv, json, model] =
+        ["run.csv", "analysis.json", "model.toml"].map(|name| folder.join(name));
+    let [run_csv, json, model] =
+        [&run_csv, &json, &model].map(|path| path.to_str().expect("a name"));
+    assert_success(&run(&["simulate", "--seconds", "60", "--out", run_csv]));
+    assert_success(&run(&["analyze", run_csv, "--json", json, "--quiet"]));
+    std::fs::write(model, model::ModelFile::paper().to_toml()).expect("a file");
+    for command in ["diagnose", "analyze"] {
+        let said = common::assert_refused(&run(&[command, json]), &["a result of this program"]);
+        assert!(said.contains("name the capture"), "{said}");
+        common::assert_refused(
+            &run(&[command, model]),
+            &["a model file", "simulate --model"],
+        );
+    }
+    let npz = folder.join("x.npz");
+    let data = run(&["export", json, "--out", npz.to_str().expect("a name")]);
+    common::assert_refused(&data, &["a result of this program"]);
+    for other in [run_csv, json] {
+        let refused = run(&["export", other, "--to", "board"]);
+        common::assert_refused(&refused, &["is no model file", "--model-out"]);
+    }
 }

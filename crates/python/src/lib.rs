@@ -228,7 +228,9 @@ impl Diagnosis {
 
     /// As the program prints it.
     fn text(&self) -> String {
-        text::diagnosis(&self.diagnosed).trim_end().to_owned()
+        text::diagnosis(&self.diagnosed, self.capture.get().record.header.base)
+            .trim_end()
+            .to_owned()
     }
 
     /// The extended model, as a file.

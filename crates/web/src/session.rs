@@ -237,7 +237,7 @@ impl Session {
         let model = diagnosed.extended_model.clone();
         let said = json!({
             "json": pretty(&diagnosed.diagnosis)?,
-            "text": text::diagnosis(&diagnosed),
+            "text": text::diagnosis(&diagnosed, opened.read.record.header.base),
             "model": model.excited_like(&opened.read.record).to_toml(),
         });
         self.diagnosed = Some(diagnosed);

@@ -10,8 +10,10 @@ use super::conventions::unit_of;
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::mapped::{beside_known, beside_ours, by_known_names, mapped};
-use super::names::{TIMES, left, meant, missing, not_read, respelt};
+use super::mapped::{UNASKED, beside_known, beside_ours, by_known_names, mapped, refuse_beside};
+use super::names::{
+    TIMES, in_its_place, left, meant, missing, not_read, other_clock, respelt, taken,
+};
 use super::propose::{stated_time, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
@@ -116,6 +118,7 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
 
 fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureError> {
     Ok(if !mapping.columns.is_empty() {
+        refuse_beside(said, mapping)?;
         match beside_ours(said, mapping) {
             Some((names, units)) => {
                 let said = Said {
@@ -185,21 +188,6 @@ fn not_twice(
         }
     }
     Ok(())
-}
-
-/// Says what was made of names that say it themselves.
-fn taken(said: &Said<'_>, mapping: &ColumnMapping, found: &Columns) -> String {
-    let columns = found.columns.iter();
-    let columns = columns.map(|c| format!("{} from `{}`", c.name, brief(&said.names[c.at])));
-    let units = mapping
-        .units
-        .iter()
-        .map(|(key, unit)| format!("{key} in {unit}"));
-    format!(
-        "columns are taken as their names say: {}; {}; `--columns` and `--units` say otherwise",
-        columns.collect::<Vec<_>>().join(", "),
-        units.collect::<Vec<_>>().join(", ")
-    )
 }
 
 /// A capture of the stand is in counts, and its header says what they mean.
@@ -295,9 +283,18 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
                 time(said, mapping, at, &mut found)?
             }
             // The stand's own time, told once more in s by `export`.
-            name if TIMES.contains(&name) && has("host_time_s") => continue,
+            name if TIMES.contains(&name) && has("host_time_s") => {
+                let is_export = said.lines.get("format").is_some();
+                found
+                    .notes
+                    .extend((!is_export).then(|| other_clock(theirs)));
+                continue;
+            }
             _ if quantity == Quantity::Other => {
-                unread.push(theirs);
+                match theirs.strip_prefix(UNASKED) {
+                    Some(theirs) => found.notes.push(in_its_place(theirs)),
+                    None => unread.push(theirs),
+                }
                 continue;
             }
             _ if unit == Some(COUNTS) => {

@@ -288,6 +288,26 @@ pub enum CaptureError {
         /// Name and length of each.
         lengths: String,
     },
+    /// No reading is one that a sensor has.
+    #[error(
+        "{channel}: all {count} readings are out of range, up to {largest:e} {unit}: no sensor reads that"
+    )]
+    #[diagnostic(
+        code(capture::out_of_range),
+        help(
+            "is the column {channel} the right one, and in the unit that the file or `--units` says? `--columns {channel}=COLUMN` takes another"
+        )
+    )]
+    OutOfRange {
+        /// The channel.
+        channel: String,
+        /// Its readings.
+        count: usize,
+        /// The farthest of them.
+        largest: f64,
+        /// In this unit.
+        unit: String,
+    },
     /// No rows at all.
     #[error("there is no row of data")]
     #[diagnostic(

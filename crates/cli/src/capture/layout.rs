@@ -10,6 +10,8 @@ use super::stream::TextLines;
 use super::time::is_date;
 use super::units::{in_brackets, known};
 
+/// The minus of typography, U+2212.
+const MINUS: char = '\u{2212}';
 /// What separates cells, in the order in which it is looked for; the last stands for any blanks.
 const SEPARATORS: [char; 4] = [';', '\t', ',', ' '];
 
@@ -368,8 +370,16 @@ impl Cells {
         }
     }
 
-    /// A number, with a point or, where commas do not separate cells, a comma before the fraction.
+    /// A number, with a point or, where commas do not separate cells, a comma before the fraction. A typographic minus, as
+    /// spreadsheets and word processors put it, is a minus.
     pub fn number(&mut self, cell: &str) -> Option<f64> {
+        self.ascii_number(cell).or_else(|| {
+            let is_typographic = cell.contains(MINUS);
+            is_typographic.then(|| self.ascii_number(&cell.replace(MINUS, "-")))?
+        })
+    }
+
+    fn ascii_number(&mut self, cell: &str) -> Option<f64> {
         if let Some(count) = short_whole(cell) {
             return Some(count);
         }

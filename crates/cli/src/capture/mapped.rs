@@ -13,6 +13,9 @@ use super::propose::{alias, guess, nearest, unknown};
 use super::units::{What, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
+/// Begins the name of a column in whose place the mapping names another: a name that is none of ours in any spelling.
+pub(super) const UNASKED: &str = "unasked ";
+
 /// Where a mapping names nothing that is analyzed (a time, a temperature, ...), and the file has gyros or accelerometers by
 /// names of ours, these are read too: the file's names with the mapping's in their places, and its units. Nothing where the
 /// mapping chooses, or the file is a capture of the stand.
@@ -21,15 +24,9 @@ pub(super) fn beside_ours(
     mapping: &ColumnMapping,
 ) -> Option<(Vec<String>, Vec<Option<String>>)> {
     let ours = |given: &str| alias(given).unwrap_or_else(|| given.to_owned());
-    let is_inertial = |name: &String| {
-        matches!(
-            meaning(in_brackets(name).0).0,
-            Quantity::Gyro | Quantity::Acc
-        )
-    };
     if !all_beside(mapping)
         || said.lines.get("format").is_some()
-        || !said.names.iter().any(is_inertial)
+        || !said.names.iter().any(|name| is_inertial(name))
     {
         return None;
     }
@@ -59,10 +56,34 @@ pub(super) fn beside_ours(
         let stem = in_brackets(&said.names[at]).0;
         let is_given = mapping.columns.iter().any(|(given, _)| ours(given) == stem);
         if is_given || (gives_time && is_time(stem)) {
-            names[at] = format!("({})", said.names[at]);
+            names[at] = format!("{UNASKED}{}", said.names[at]);
         }
     }
     Some((names, units))
+}
+
+/// Refuses to put a column beside those of a capture of the stand: its header scales them, and a mapping would read the counts
+/// of a thermometer as degC, and leave out the gyros.
+pub(super) fn refuse_beside(said: &Said<'_>, mapping: &ColumnMapping) -> Result<(), CaptureError> {
+    let is_capture =
+        said.lines.get("format").is_some() && said.names.iter().any(|name| is_inertial(name));
+    if !is_capture || !all_beside(mapping) {
+        return Ok(());
+    }
+    Err(CaptureError::Option {
+        option: "--columns",
+        why: "the file is a capture, whose header says what its columns are".to_owned(),
+        help: "leave it out: all of them are read; to read the cells of a gyro as other values, map it: `--columns gyro_x=gyro_x`"
+            .to_owned(),
+    })
+}
+
+/// Whether a name is that of a gyro or an accelerometer.
+fn is_inertial(name: &str) -> bool {
+    matches!(
+        meaning(in_brackets(name).0).0,
+        Quantity::Gyro | Quantity::Acc
+    )
 }
 
 /// Whether a mapping names nothing that is analyzed.

@@ -3,9 +3,13 @@
 
 use model::record::Quantity;
 
+use super::ColumnMapping;
+use super::columns::{Columns, Said};
+use super::conventions::unit_of;
 use super::error::brief;
 use super::foreign::meaning;
 use super::propose::alias;
+use super::units::{What, known};
 
 /// The names of the format.
 const OURS: [&str; 16] = [
@@ -158,6 +162,45 @@ pub(super) fn left(names: &[String], is_read: &dyn Fn(usize) -> bool) -> Option<
         let listed = listed.join(", ");
         format!("not read: {listed}{more}; `--columns` maps them, too")
     })
+}
+
+/// Says what was made of names that say it themselves.
+pub(super) fn taken(said: &Said<'_>, mapping: &ColumnMapping, found: &Columns) -> String {
+    let columns = found.columns.iter();
+    let columns = columns.map(|c| format!("{} from `{}`", c.name, brief(&said.names[c.at])));
+    let mut units: Vec<String> = (mapping.units.iter())
+        .map(|(key, unit)| format!("{key} in {unit}"))
+        .collect();
+    for column in &found.columns {
+        let quantity = meaning(&column.name).0;
+        let is_said = (mapping.units.iter()).any(|(key, _)| column.name.starts_with(key.as_str()));
+        let unit = unit_of(&said.names[column.at], What::Channel(quantity), said.names);
+        let unit = said.units[column.at].as_deref().or(unit).and_then(known);
+        if let (Quantity::Acc | Quantity::Temp | Quantity::Supply, false, Some(unit)) =
+            (quantity, is_said, unit)
+        {
+            units.push(format!("{} in {unit}", column.name));
+        }
+    }
+    format!(
+        "columns are taken as their names say: {}; {}; `--columns` and `--units` say otherwise",
+        columns.collect::<Vec<_>>().join(", "),
+        units.join(", ")
+    )
+}
+
+/// Says that a column is not read, because the mapping names another one for it.
+pub(super) fn in_its_place(column: &str) -> String {
+    let column = brief(column);
+    format!("`{column}` is not read: `--columns` names another column for it")
+}
+
+/// Says which of two times is not read.
+pub(super) fn other_clock(column: &str) -> String {
+    let column = brief(column);
+    format!(
+        "the times are those of `host_time_s`, and `{column}` is not read: `--columns time={column}` takes it in its place"
+    )
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use model::record::{Channel, FULL_DUTY, Quantity, Record};
 
-use super::STANDARD_GRAVITY;
+use super::{CaptureError, STANDARD_GRAVITY};
 
 /// White noise of the ADIS16250, a noisy part (data sheet), deg/s/sqrt(Hz). A reading at rest that is five times as noisy is
 /// more often a unit that is wrong by 57.3.
@@ -32,6 +32,29 @@ pub(super) fn doubts(record: &Record, is_assumed: bool) -> Vec<String> {
     notes.extend(command(record));
     notes.extend(copy(record));
     notes
+}
+
+/// Refuses a record of whose gyros, or of whose channels where it has none, nothing is `kept` that was `read`, because no
+/// sensor reads such numbers.
+pub(super) fn in_range(read: &Record, kept: &Record) -> Result<(), CaptureError> {
+    let is_gyro = |c: &Channel| c.quantity == Quantity::Gyro;
+    let has_gyro = read.channels.iter().any(is_gyro);
+    let has_reading = |c: &Channel| c.values.iter().any(|v| !v.is_nan());
+    let both = read.channels.iter().zip(&kept.channels);
+    let mut both = both.filter(|(c, _)| is_gyro(c) || !has_gyro);
+    if both.clone().any(|(_, kept)| has_reading(kept)) {
+        return Ok(());
+    }
+    let Some((beyond, _)) = both.find(|(c, _)| has_reading(c)) else {
+        return Ok(());
+    };
+    let readings = || beyond.values.iter().copied().filter(|v| !v.is_nan());
+    Err(CaptureError::OutOfRange {
+        channel: beyond.name.clone(),
+        count: readings().count(),
+        largest: readings().fold(0.0, |a: f64, v| if v.abs() > a.abs() { v } else { a }),
+        unit: beyond.unit.clone(),
+    })
 }
 
 /// Two axes have no noise in common to the last digit.

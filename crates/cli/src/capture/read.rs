@@ -15,7 +15,7 @@ use super::header::Lines;
 use super::layout::{Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
-use super::plausible::doubts;
+use super::plausible::{doubts, in_range};
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
@@ -295,7 +295,11 @@ fn finish(
     check_rate(&mut record, options.rate_hz)?;
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
-    let mut record = sentinels::left_out(fills::left_out(Cow::Owned(record))).into_owned();
+    if let Cow::Owned(kept) = fills::left_out(Cow::Borrowed(&record)) {
+        in_range(&record, &kept)?;
+        record = kept;
+    }
+    let mut record = sentinels::left_out(Cow::Owned(record)).into_owned();
     record.header.base = options.base.or(record.header.base);
     let doubts = doubts(&record, !found.assumed_gyros.is_empty());
     record.notes.extend(doubts);

@@ -269,7 +269,7 @@ fn turned(record: &Record, times: Option<&[f64]>) -> Option<String> {
     let place = when.map_or(format!("row {}", row + 1), |t| format!("{t:.4} s"));
     Some(format!(
         "the sensor is turned against gravity, by {most:.0} deg at most, from {place} on: noise figures are of a sensor that \
-         lies still; take one part (`--span FROM,TO`), or say in its header what the base does (`# base: moving`)"
+         lies still; take one part (`--span FROM,TO`), or say what the base does (`--base moving`)"
     ))
 }
 

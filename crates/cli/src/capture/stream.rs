@@ -93,14 +93,36 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
     }
     const AS_CSV: &str =
         "save the readings as CSV, a line of column names and then a row for each sample";
-    let known: [(&[u8], _); 5] = [
-        (b"{\"", "JSON"),
+    let known: [(&[u8], _); 4] = [
         (b"[{", "JSON"),
         (b"<?xml", "XML"),
         (b"<!DOCTYPE", "a web page"),
         (b"<html", "a web page"),
     ];
     let begins = start.trim_ascii_start();
+    let model = b"format = \"imu-stand-model/";
+    if start
+        .split(|b| *b == b'\n')
+        .any(|line| line.starts_with(model))
+    {
+        return Some((
+            "a model file",
+            "`imu-stand simulate --model FILE --out run.csv` makes a capture of it, `imu-stand export FILE --to kalibr` writes its \
+             noise figures",
+        ));
+    }
+    if let Some(object) = begins.strip_prefix(b"{").map(<[u8]>::trim_ascii_start) {
+        if object.starts_with(b"\"format\": \"imu-stand-") {
+            return Some((
+                "a result of this program (JSON)",
+                "name the capture that it was made of; `imu-stand export FILE --to kalibr` writes the noise figures of an analysis \
+                 or a diagnosis",
+            ));
+        }
+        if object.starts_with(b"\"") {
+            return Some(("JSON", AS_CSV));
+        }
+    }
     if let Some((_, what)) = known.iter().find(|(how, _)| begins.starts_with(how)) {
         return Some((what, AS_CSV));
     }

@@ -8,7 +8,7 @@ use diagnosis::result::{Diagnosed, Diagnosis, Verdict};
 use imu_stand::report::Subject;
 use imu_stand::text;
 use miette::Result;
-use model::record::Record;
+use model::record::{Base, Record};
 use serde::Serialize;
 
 use super::{Input, Outputs, Replicates, many};
@@ -87,6 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// A capture and what was found in it.
 struct Found {
     record: Record,
+    base: Option<Base>,
     hash: String,
     diagnosed: Diagnosed,
 }
@@ -94,6 +95,7 @@ struct Found {
 /// Diagnoses a capture; its record is kept only where it is needed again.
 fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
     let mut record = arguments.input.read(path)?.record;
+    let base = record.header.base;
     let hash = super::digest(path)?;
     let options = DiagnoseOptions {
         seed: arguments.seed,
@@ -112,6 +114,7 @@ fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
     };
     Ok(Found {
         record,
+        base,
         hash,
         diagnosed: diagnosed.map_err(super::explain)?,
     })
@@ -121,6 +124,7 @@ fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
     let is_needed = arguments.model_out.is_some() || arguments.report.is_some();
     let Found {
         record,
+        base,
         hash,
         diagnosed,
     } = found(arguments, path, is_needed)?;
@@ -130,7 +134,7 @@ fn alone(arguments: &Arguments, path: &Path) -> Result<()> {
     }
     super::write_json(arguments.json.as_ref(), &diagnosed.diagnosis)?;
     if !arguments.input.quiet {
-        say!("{}", text::diagnosis(&diagnosed).trim_end());
+        say!("{}", text::diagnosis(&diagnosed, base).trim_end());
         match arguments.details {
             true => say!("{}", text::details(&diagnosed.diagnosis).trim_end()),
             false => say!("{}", text::MORE),
@@ -160,10 +164,12 @@ struct Short {
 /// Diagnoses captures side by side. One that cannot be read keeps no other from its answer.
 fn several(arguments: &Arguments, captures: &[PathBuf]) -> Result<()> {
     let all: Vec<Result<Short>> = many::in_parallel(captures, arguments.input.quiet, |path| {
-        let diagnosed = found(arguments, path, false)?.diagnosed;
+        let Found {
+            base, diagnosed, ..
+        } = found(arguments, path, false)?;
         let mut text = String::new();
         if arguments.details {
-            text = text::diagnosis(&diagnosed) + &text::details(&diagnosed.diagnosis);
+            text = text::diagnosis(&diagnosed, base) + &text::details(&diagnosed.diagnosis);
         }
         let diagnosis = diagnosed.diagnosis;
         Ok(Short { text, diagnosis })
@@ -187,7 +193,7 @@ fn several(arguments: &Arguments, captures: &[PathBuf]) -> Result<()> {
             Err(error) => {
                 let causes: Vec<String> = error.chain().map(ToString::to_string).collect();
                 let why = causes.join(": ");
-                rows.push([file.clone(), "not read".to_owned(), why.clone()]);
+                rows.push([file.clone(), "no answer".to_owned(), why.clone()]);
                 several.failed.push(Failed { file, why });
             }
         }

@@ -95,7 +95,7 @@ const SENS_AVG: u16 = 0x0402;
 
 fn board(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
-    let model = super::read_model(&arguments.file)?;
+    let model = export_source::model(&arguments.file)?;
     let board = BoardCorrection::of(&model, SENS_AVG).map_err(|error| {
         miette::miette!(
             help = "docs/wire-format.md lists what the board holds",

@@ -6,7 +6,7 @@ use std::path::Path;
 use diagnosis::result::{DIAGNOSIS_FORMAT, Diagnosis};
 use imu_stand::export::noise::ImuNoise;
 use miette::Result;
-use model::file::FORMAT as MODEL_FORMAT;
+use model::file::{FORMAT as MODEL_FORMAT, ModelFile};
 use noise::analyze::{ANALYSIS_FORMAT, Analysis};
 use serde::Deserialize;
 
@@ -30,20 +30,43 @@ impl Source {
 /// Bytes of a file by which it is recognised. A model begins with its format, below comments at most.
 const START: u64 = 1 << 14;
 
-/// What a file is, by how it begins; its content where that is no capture.
-pub fn recognise(path: &Path) -> Result<Source> {
+/// How a file begins; nothing of one that cannot be read, which is told by who reads it.
+fn start_of(path: &Path) -> Vec<u8> {
     let mut start = Vec::new();
     let is_dash = path.as_os_str() == super::outputs::DASH;
     if !is_dash && let Ok(file) = std::fs::File::open(path) {
-        // What cannot be read is told by who reads it.
         let _ = file.take(START).read_to_end(&mut start);
     }
+    start
+}
+
+/// Whether a file begins like a model.
+fn is_model(start: &[u8]) -> bool {
+    let is_toml = |line: &[u8]| line.starts_with(b"format") && !line.contains(&b',');
+    start.split(|b| *b == b'\n').any(is_toml) && contains(start, MODEL_FORMAT.as_bytes())
+}
+
+/// A model; what is none says how one is made.
+pub fn model(path: &Path) -> Result<ModelFile> {
+    let start = start_of(path);
+    if !start.is_empty() && !is_model(&start) {
+        miette::bail!(
+            help = "`imu-stand diagnose CAPTURE --model-out model.toml` writes one",
+            "{} is no model file: no line of it says `format = \"{MODEL_FORMAT}\"`",
+            path.display()
+        );
+    }
+    super::read_model(path)
+}
+
+/// What a file is, by how it begins; its content where that is no capture.
+pub fn recognise(path: &Path) -> Result<Source> {
+    let start = start_of(path);
     let begins = start.trim_ascii_start();
     if begins.starts_with(b"{") {
         return json(path);
     }
-    let is_toml = |line: &[u8]| line.starts_with(b"format") && !line.contains(&b',');
-    if start.split(|b| *b == b'\n').any(is_toml) && contains(&start, MODEL_FORMAT.as_bytes()) {
+    if is_model(&start) {
         let model = super::read_model(path)?;
         return Ok(Source::Ready(Box::new(ImuNoise::of_model(&model))));
     }

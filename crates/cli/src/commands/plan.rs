@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use imu_stand::plan::{
     Noise, Plan, Request, SEQUENCES, Told, Z_95, lengths, of_model, of_record, plan,
 };
@@ -17,6 +17,7 @@ use super::{Input, Outputs};
 
 /// What `plan` takes.
 #[derive(Args)]
+#[command(group(ArgGroup::new("answer").required(true).multiple(true).args(["want", "separate"])))]
 pub struct Arguments {
     /// A capture whose noise is the present knowledge; without it and without --model the paper's figures
     capture: Option<PathBuf>,
@@ -25,10 +26,10 @@ pub struct Arguments {
     model: Option<PathBuf>,
     /// How well something is wanted, 95 %: `"K within 20 %"` (of N, B, K, Q, R) or `"angle within 2 deg after 600 s"`;
     /// several separated by commas
-    #[arg(long, value_name = "TERM within X %")]
+    #[arg(long, value_name = "TERM within X %", value_parser = want)]
     want: Option<String>,
     /// Two causes to be told apart: `temperature,rate_ramp`
-    #[arg(long, value_name = "CAUSE,CAUSE")]
+    #[arg(long, value_name = "CAUSE,CAUSE", value_parser = separate)]
     separate: Option<String>,
     /// The gyro, where there are several
     #[arg(long, value_name = "NAME")]
@@ -45,6 +46,42 @@ pub struct Arguments {
     json: Option<PathBuf>,
     #[command(flatten)]
     input: Input,
+}
+
+/// A wish that is understood.
+fn want(text: &str) -> std::result::Result<String, String> {
+    let want = Some(text);
+    understood(
+        text,
+        &Request {
+            want,
+            ..Request::default()
+        },
+    )
+}
+
+/// Two causes that there are.
+fn separate(text: &str) -> std::result::Result<String, String> {
+    let separate = Some(text);
+    understood(
+        text,
+        &Request {
+            separate,
+            ..Request::default()
+        },
+    )
+}
+
+fn understood(text: &str, request: &Request<'_>) -> std::result::Result<String, String> {
+    match request.check_words() {
+        Ok(()) => Ok(text.to_owned()),
+        Err(error) => Err(format!(
+            "{error}; {}",
+            error
+                .help()
+                .map_or_else(String::new, |help| help.to_string())
+        )),
+    }
 }
 
 /// Runs it.

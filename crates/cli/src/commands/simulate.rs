@@ -40,6 +40,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => ModelFile::paper(),
         Some(path) => super::read_model(path)?,
     };
+    if model.channels.is_empty() {
+        let path = arguments.model.as_deref().unwrap_or_else(|| "".as_ref());
+        miette::bail!(
+            help = "each gyro or accelerometer is a [[channel]] of it (docs/model-file.md): was the file copied whole?",
+            "{}: the model has no [[channel]], so there is nothing to simulate",
+            path.display()
+        );
+    }
     let rate = arguments.rate.unwrap_or(model.rate_hz);
     for (cause, settings) in model::excitation::unexcited(&model) {
         warn!(

@@ -3,6 +3,9 @@
 use wire::LinkCounts;
 use wire::link::Losses;
 
+/// Speed of a board in which none is stored.
+const USUAL_BAUD: u16 = 38_400;
+
 /// What came over a line so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
@@ -38,7 +41,11 @@ impl std::fmt::Display for Heard {
             )?;
         }
         if lost.device + lost.line + lost.unattributed == 0 {
-            return f.write_str("; no sample lost");
+            // Where nothing was understood, nobody knows of samples.
+            return match counts.frames {
+                0 => Ok(()),
+                _ => f.write_str("; no sample lost"),
+            };
         }
         write!(
             f,
@@ -80,7 +87,8 @@ impl Heard {
     #[must_use]
     pub fn remedy(&self, baud: u32) -> String {
         if self.bytes == 0 {
-            return "the line is dead: is the board powered, the cable a crossed one (TXD to RXD), and this its port?"
+            return "the line is dead: is the board powered, does the PC's TXD go to the board's RXD (between 9-pin connectors by \
+                    a straight cable: docs/hardware.md), and is this its port?"
                 .to_owned();
         }
         if self.counts.unknown_version > 0 {
@@ -89,9 +97,13 @@ impl Heard {
                 .to_owned();
         }
         if self.counts.frames == 0 {
+            let other = match baud == u32::from(USUAL_BAUD) {
+                true => "try `--baud` with the one that was stored, or see whether another device is at this port".to_owned(),
+                false => format!("try `--baud {USUAL_BAUD}`, or the one you set"),
+            };
             return format!(
                 "bytes arrive but no frame: the speed is probably not {baud} baud. After a reset the board has what is \
-                 stored, 38400 if nothing is: try `--baud 38400`, or the one you set"
+                 stored, {USUAL_BAUD} if nothing is: {other}"
             );
         }
         "the board talks but does not hear: check the wire from the PC's TXD to PD0 (docs/hardware.md); `board health` of a \
@@ -112,8 +124,19 @@ mod tests {
             bytes: 100,
             ..Heard::default()
         };
+        assert_eq!(
+            noise.to_string(),
+            "100 bytes, 0 frames in order, 0 rejected"
+        );
         assert!(noise.remedy(9600).contains("9600 baud"));
+        assert!(noise.remedy(9600).contains("`--baud 38400`"));
+        let usual = noise.remedy(38_400);
+        assert!(
+            !usual.contains("--baud 38400") && usual.contains("another device"),
+            "{usual}"
+        );
         noise.counts.frames = 3;
+        assert!(noise.to_string().ends_with("no sample lost"));
         assert!(noise.remedy(9600).contains("does not hear"));
         noise.counts.unknown_version = 1;
         assert!(noise.remedy(9600).contains("version"));

@@ -184,16 +184,10 @@ pub fn plan(noise: Noise, request: &Request<'_>) -> Result<Plan> {
         }
     }
     if let Some(text) = request.separate {
-        let causes: Vec<&str> = text.split(',').map(str::trim).collect();
-        let [a, b] = causes[..] else {
-            miette::bail!(
-                help = "write `--separate temperature,rate_ramp`",
-                "--separate: `{text}` is not two causes"
-            );
-        };
-        for (cause, rival) in [(a, b), (b, a)] {
+        let [a, b] = separate::two_causes(text)?;
+        for pair in [[a, b], [b, a]] {
             let known = plan.noise.known();
-            let told = separate::separate(&known, plan.noise.rate_hz, cause, rival)?;
+            let told = separate::separate(&known, plan.noise.rate_hz, pair)?;
             plan.separate.extend(told);
         }
     }
@@ -213,6 +207,16 @@ impl Request<'_> {
             );
         }
         Ok(())
+    }
+
+    /// Whether what is asked for is understood, whatever the noise.
+    ///
+    /// # Errors
+    /// What is not, and how it is written.
+    pub fn check_words(&self) -> Result<()> {
+        self.want.map_or(Ok(Vec::new()), wishes)?;
+        self.separate
+            .map_or(Ok(()), |text| separate::two_causes(text).map(drop))
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use miette::Result;
+use model::effect::Effect;
 use model::effects::{EFFECTS, effect};
 use noise::discriminate::{PRESETS, separation};
 use noise::plan::KnownNoise;
@@ -42,13 +43,15 @@ pub fn lengths() -> Vec<f64> {
         .collect()
 }
 
-/// What each excitation of the stand tells `cause` from `rival` by.
-pub(super) fn separate(
-    noise: &KnownNoise,
-    rate_hz: f64,
-    cause: &str,
-    rival: &str,
-) -> Result<Vec<Told>> {
+/// The two causes of `temperature,rate_ramp`.
+pub(super) fn two_causes(text: &str) -> Result<[&'static dyn Effect; 2]> {
+    let causes: Vec<&str> = text.split(',').map(str::trim).collect();
+    let [a, b] = causes[..] else {
+        miette::bail!(
+            help = "write `--separate temperature,rate_ramp`",
+            "--separate: `{text}` is not two causes"
+        );
+    };
     let find = |id: &str| {
         effect(id).ok_or_else(|| {
             let known: Vec<&str> = EFFECTS.iter().map(|e| e.id()).collect();
@@ -58,7 +61,16 @@ pub(super) fn separate(
             )
         })
     };
-    let (a, b) = (find(cause)?, find(rival)?);
+    Ok([find(a)?, find(b)?])
+}
+
+/// What each excitation of the stand tells the first from the second by.
+pub(super) fn separate(
+    noise: &KnownNoise,
+    rate_hz: f64,
+    [a, b]: [&'static dyn Effect; 2],
+) -> Result<Vec<Told>> {
+    let (cause, rival) = (a.id(), b.id());
     let mut out = Vec::new();
     for preset in PRESETS {
         let settings: BTreeMap<String, f64> = preset

@@ -3,6 +3,7 @@
 use diagnosis::result::{Check, Finding, NotTested, Unexplained, Verdict};
 use maud::{Markup, html};
 use model::file::ModelFile;
+use model::record::Base;
 
 use super::Subject;
 use super::plot::number;
@@ -41,7 +42,7 @@ pub(super) fn verdict(subject: &Subject<'_>, headline: &str) -> Markup {
         }
         @if !d.findings.is_empty() {
             section.findings {
-                @for found in &d.findings { (finding(found)) }
+                @for found in &d.findings { (finding(found, subject.record.header.base)) }
             }
         }
         (left_over(&d.unexplained))
@@ -138,12 +139,12 @@ pub(super) fn replicates(subject: &Subject<'_>) -> Markup {
     }
 }
 
-fn finding(found: &Finding) -> Markup {
+fn finding(found: &Finding, base: Option<Base>) -> Markup {
     html! {
         article {
             h2 { (answer::title(&found.cause)) small { " on " (found.channels.join(", ")) ", " code { (found.cause) } } }
             @if let Some(cost) = answer::cost(found) { p { (with_code(&cost)) } }
-            @if let Some(remedy) = answer::remedy(found).filter(|_| found.material) { p { (remedy) } }
+            @if let Some(remedy) = answer::remedy(found, base).filter(|_| found.material) { p { (remedy) } }
             table.plain {
                 tbody {
                     @for (name, parameter) in answer::listed(found) {

@@ -6,6 +6,7 @@ use diagnosis::result::{Finding, Parameter, Unexplained};
 use model::effect::Parameters;
 use model::effects::effect;
 use model::one_source;
+use model::record::Base;
 
 use crate::report::plot::{fixed, number, tidy};
 pub use crate::text::cost::{consequence_of, cost};
@@ -14,6 +15,8 @@ pub use crate::text::cost::{consequence_of, cost};
 pub const HALF_WIDTH_95: f64 = 1.96;
 /// Parameters that a sentence names; the others stand in the details.
 const NAMED: usize = 3;
+/// The end of a remedy that asks what the base did.
+const ASKED_OF_BASE: &str = " Where the base stood still, say so: --base static.";
 /// What a cause is called in a headline.
 #[must_use]
 pub fn title(cause: &str) -> &str {
@@ -127,7 +130,8 @@ pub fn brief(finding: &Finding) -> String {
     let size = named(finding)
         .into_iter()
         .next()
-        .map(|(_, p)| match p.unit.as_str() {
+        .map(|(name, p)| match p.unit.as_str() {
+            _ if is_count(name, p) => format!(" {:.0}", p.value),
             "1" => format!(" {}", number(p.value, 3)),
             unit => format!(" {} {unit}", number(p.value, 3)),
         });
@@ -197,9 +201,15 @@ pub fn modelled(left: &Unexplained) -> Option<String> {
 }
 
 /// What to change about the stand, the filter or the model.
+///
+/// Where the operator has said what the `base` did, nobody asks for it.
 #[must_use]
-pub fn remedy(finding: &Finding) -> Option<String> {
+pub fn remedy(finding: &Finding, base: Option<Base>) -> Option<String> {
     let remedy = effect(&finding.cause)?.docs().remedy;
+    let remedy = match base {
+        Some(_) => remedy.strip_suffix(ASKED_OF_BASE).unwrap_or(remedy),
+        None => remedy,
+    };
     (!remedy.is_empty()).then(|| format!("What to do: {remedy}"))
 }
 
@@ -231,7 +241,25 @@ fn ended(text: &str) -> &str {
 /// A parameter of an effect with its 95 % interval, which ends where the parameter does (a share at 1), and unit.
 #[must_use]
 pub fn size(name: &str, p: &Parameter) -> String {
-    between(p, model::bounds(name, &p.unit))
+    match is_count(name, p) {
+        true => counted(p),
+        false => between(p, model::bounds(name, &p.unit)),
+    }
+}
+
+/// Whether a parameter counts samples or frames.
+fn is_count(name: &str, p: &Parameter) -> bool {
+    matches!(name, "count" | "clipped") && p.unit == "1"
+}
+
+/// A count with the whole numbers that its 95 % interval reaches from and to, where those are others.
+fn counted(p: &Parameter) -> String {
+    let half = HALF_WIDTH_95 * p.std_error.filter(|e| e.is_finite()).unwrap_or(0.0);
+    let [value, low, high] = [p.value, (p.value - half).max(0.0), p.value + half].map(f64::round);
+    match low < high {
+        true => format!("{value} (95\u{a0}%: {low} to {high})"),
+        false => value.to_string(),
+    }
 }
 
 /// The same of a finding: what its effect requires was estimated, and says so where the record gives no interval; the rest

@@ -8,6 +8,8 @@ use crate::report::plot::number;
 
 /// An angle error that changes by less than this share of itself is not worth a sentence (design: `--matters`, percent).
 const MATTERS: f64 = 0.05;
+/// A smaller share is told by this limit, percent.
+const LEAST_PERCENT: f64 = 0.01;
 /// Digits of an angle error.
 const ANGLE_DIGITS: usize = 2;
 
@@ -16,14 +18,14 @@ const ANGLE_DIGITS: usize = 2;
 pub fn cost(finding: &Finding) -> Option<String> {
     match &finding.consequence {
         Some(consequence) if finding.material && is_filter(finding) => Some(format!(
-            "It takes {} off the variance of the readings, and leaves the angle as it is; without it a deviation is off by up to {}.",
+            "It takes {} off the variance of the readings, and leaves the angle as it is; without it a deviation is off by {}.",
             percent(consequence.share_of_variance),
-            percent(consequence.largest_change)
+            at_most(consequence.largest_change)
         )),
         Some(consequence) => Some(match taken(finding).filter(|_| finding.material) {
             Some(what) => format!(
-                "It takes {what} from the readings; without it a deviation is off by up to {}.",
-                percent(consequence.largest_change)
+                "It takes {what} from the readings; without it a deviation is off by {}.",
+                at_most(consequence.largest_change)
             ),
             None => consequence_of(consequence, finding.material),
         }),
@@ -64,8 +66,8 @@ pub fn consequence_of(of: &Consequence, material: bool) -> String {
     // A noise that changes its size adds nothing of its own that could be told apart.
     if of.share_of_variance <= 0.0 && by_horizon.values().all(|v| *v <= 0.0) {
         return format!(
-            "It changes {what} error or a deviation by up to {}.",
-            percent(of.largest_change)
+            "It changes {what} error or a deviation by {}.",
+            at_most(of.largest_change)
         );
     }
     let share = format!("{} of the variance", percent(of.share_of_variance));
@@ -81,9 +83,18 @@ pub fn consequence_of(of: &Consequence, material: bool) -> String {
 /// A share in percent, of two digits.
 fn percent(share: f64) -> String {
     match 100.0 * share {
-        p if p < 0.01 => "less than 0.01 %".to_owned(),
+        p if p < LEAST_PERCENT => format!("less than {LEAST_PERCENT} %"),
         p => format!("{} %", number(p, 2)),
     }
+}
+
+/// The largest of some shares, in percent.
+fn at_most(share: f64) -> String {
+    let prefix = match 100.0 * share < LEAST_PERCENT {
+        true => "",
+        false => "up to ",
+    };
+    prefix.to_owned() + &percent(share)
 }
 
 /// The same by the angle errors that its gain states.

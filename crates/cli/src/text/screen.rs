@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained};
+use model::record::Base;
 
 use super::noise::{self, Shown};
 use super::{advice, answer, item, verdict};
@@ -15,9 +16,9 @@ const WORDS: usize = 28;
 /// What the commands print below it where the details are not asked for.
 pub const MORE: &str = "--details: gains, failing checks, why not tested, the smallest sizes found";
 
-/// A diagnosis, verdict first.
+/// A diagnosis, verdict first, of a record whose `base` did what is said there.
 #[must_use]
-pub fn diagnosis(diagnosed: &Diagnosed) -> String {
+pub fn diagnosis(diagnosed: &Diagnosed, base: Option<Base>) -> String {
     let d = &diagnosed.diagnosis;
     let mut out = String::new();
     let input = &d.input;
@@ -38,7 +39,7 @@ pub fn diagnosis(diagnosed: &Diagnosed) -> String {
         let lines = [
             answer::elsewhere(finding),
             answer::cost(finding),
-            remedy(&material, k),
+            remedy(&material, k, base),
             answer::open_question(finding),
         ];
         for line in lines.into_iter().flatten() {
@@ -85,11 +86,11 @@ fn write_replicates(out: &mut String, d: &Diagnosis) {
 }
 
 /// What to do about the finding of the number `k`; once a cause.
-fn remedy(all: &[&Finding], k: usize) -> Option<String> {
+fn remedy(all: &[&Finding], k: usize, base: Option<Base>) -> Option<String> {
     let same = all.iter().position(|f| f.cause == all[k].cause);
     match same.filter(|first| *first < k) {
         Some(first) => Some(format!("What to do: as for {}.", first + 1)),
-        None => answer::remedy(all[k]),
+        None => answer::remedy(all[k], base),
     }
 }
 

@@ -114,3 +114,52 @@ fn one_thermometer_is_that_of_all_gyros_and_any_column_of_any_unit_is_a_channel(
     assert_eq!((freq.unit.as_str(), freq.values[1]), ("1", 2.0));
     assert!(clock.notes.is_empty(), "{:?}", clock.notes);
 }
+
+#[test]
+fn a_second_time_that_is_not_read_and_the_unit_of_a_name_are_told() {
+    let text = "host_time_s,time_s,gyro_x\n100,0,1\n100.03,0.02,2\n100.04,0.04,3\n";
+    let arrival = read(text.as_bytes(), "", "gyro=deg/s")
+        .expect("two times")
+        .record;
+    let notes = arrival.notes.join("; ");
+    assert_eq!(
+        arrival.host_time_s.as_ref().map(|t| t[1] > 100.02),
+        Some(true)
+    );
+    assert!(
+        notes.contains("those of `host_time_s`, and `time_s` is not read: `--columns time=time_s`"),
+        "{notes}"
+    );
+    let asked = read(text.as_bytes(), "time=time_s", "gyro=deg/s")
+        .expect("one of two")
+        .record;
+    let notes = asked.notes.join("; ");
+    assert!(
+        notes.contains("`host_time_s` is not read: `--columns` names another"),
+        "{notes}"
+    );
+    assert!((asked.host_time_s.expect("times")[1] - 0.02).abs() < 1e-12);
+
+    let text = "time_s,gyro_x_dps,temp_F\n0,1,68\n0.02,2,86\n0.04,3,86\n";
+    let fahrenheit = read(text.as_bytes(), "", "")
+        .expect("all names say it")
+        .record;
+    assert!((fahrenheit.channel("temp").expect("temp").values[1] - 30.0).abs() < 1e-9);
+    let notes = fahrenheit.notes.join("; ");
+    assert!(notes.contains("gyro in deg/s, temp in degF"), "{notes}");
+}
+
+#[test]
+fn nothing_is_mapped_beside_the_columns_of_a_capture() {
+    let own = "# format: imu-stand-capture/1\n# gyro_lsb_dps: 0.07\n# temp_lsb_c: 0.1\n# temp_zero_c: 25\nseq,gyro_x,temp_x\n0,1,9\n1,2,9\n";
+    let said = error(own.as_bytes(), "temp=temp_x", "");
+    assert!(
+        said.contains("--columns: the file is a capture") && said.contains("leave it out"),
+        "{said}"
+    );
+    // Who maps a gyro chooses, as before.
+    let chosen = read(own.as_bytes(), "gyro_x=gyro_x", "gyro=deg/s")
+        .expect("a gyro")
+        .record;
+    assert_eq!(chosen.channels[0].values, [1.0, 2.0]);
+}

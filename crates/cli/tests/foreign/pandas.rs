@@ -67,3 +67,44 @@ fn times_too_coarse_to_tell_a_rate_ask_for_it() {
         read.record.notes
     );
 }
+
+#[test]
+fn a_typographic_minus_is_a_minus() {
+    let text = "t;gx\n0;\u{2212}0,25\n0,02;1,5e\u{2212}1\n0,04;-7\n";
+    let record = read(text.as_bytes(), "time=t,gyro_x=gx", "gyro=deg/s")
+        .expect("numbers")
+        .record;
+    assert_eq!(record.channels[0].values, [-0.25, 0.15, -7.0]);
+    let said = error(
+        "t,gx\n0,1\n0.02,\u{2212}\n".as_bytes(),
+        "time=t,gyro_x=gx",
+        "gyro=deg/s",
+    );
+    assert!(
+        said.contains("line 3") && said.contains("not a finite number"),
+        "{said}"
+    );
+}
+
+#[test]
+fn readings_that_no_sensor_has_are_out_of_range_and_not_missing() {
+    let rows = |gyro: &str| {
+        (0..9).fold("time_s,gyro_x,gyro_y\n".to_owned(), |text, k| {
+            text + &format!("{},1e200,{gyro}\n", 0.02 * f64::from(k))
+        })
+    };
+    let said = error(rows("nan").as_bytes(), "", "gyro=deg/s");
+    assert!(
+        said.contains("gyro_x: all 9 readings are out of range, up to 1e200 deg/s")
+            && said.contains("--units"),
+        "{said}"
+    );
+    let one = read(rows("2").as_bytes(), "", "gyro=deg/s")
+        .expect("one gyro is whole")
+        .record;
+    assert!(
+        one.notes.join("; ").contains("no sensor reads"),
+        "{:?}",
+        one.notes
+    );
+}

@@ -310,6 +310,8 @@ pub fn found(panel: &Panel, state: &State, unit: &str, rate_hz: f64) -> Vec<Foun
         };
         if let Form::Shaped(shape, at) = &t.form {
             (found.location, found.coefficients) = shaped(panel, state, t, shape, *at);
+            let coordinate = found.location.iter_mut().take(1);
+            coordinate.for_each(|(value, _)| *value = shape.told(*value));
             // A delay is told in seconds.
             let late = found.location.iter_mut().skip(1);
             late.for_each(|(delay, error)| (*delay, *error) = (*delay / rate_hz, *error / rate_hz));

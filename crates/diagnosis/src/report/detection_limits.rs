@@ -312,11 +312,11 @@ fn of_shape(
     let (place, columns) = c.grid().get(c.grid().len() / 2)?;
     let parameter = shape.columns(*place).first()?.parameter;
     let (first, rest) = columns.split_first()?;
-    let wanted = strength_for(threshold::shaped(columns.len(), c.grid().len()));
+    let wanted = strength_for(c.limit_of_shape(columns.len()));
     let size = meter.column(&[own.as_slice(), rest].concat(), *first, wanted)?;
     Some(Smallest {
         coefficients: vec![size],
-        location: vec![*place],
+        location: vec![shape.told(*place)],
         names: vec![parameter],
         parameter,
         at: vec![shape.coordinate().0],

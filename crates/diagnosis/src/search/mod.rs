@@ -134,6 +134,7 @@ type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
 fn channels_of(hypothesis: &Hypothesis) -> Vec<String> {
     let follows = match hypothesis {
         Hypothesis::Regression(r) => r.follows.as_deref(),
+        Hypothesis::Shaped(s) => s.follows(),
         _ => None,
     };
     let names = follows.into_iter().flat_map(|f| f.split(", "));
@@ -461,7 +462,7 @@ impl<'a> Search<'a> {
                 c.effect.id() != channel::ID
             }
         };
-        let mut rest = self.without(state, i);
+        let mut rest = self.cleared_of(state, i);
         for others in 0..=3 {
             if others > 0 {
                 let offer = Self::simplest_best(self.offers(&rest, &allow));

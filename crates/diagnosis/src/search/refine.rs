@@ -101,9 +101,19 @@ impl Search<'_> {
     }
 
     /// Add a term, in place of the one that it extends.
-    pub(crate) fn accept(&self, state: &State, term: Term) -> State {
-        let mut term = self.refine(state, self.stripped(state, term));
-        let mut terms = state.terms.clone();
+    pub(crate) fn accept(&self, state: &State, mut term: Term) -> State {
+        let mut beside = state.clone();
+        if let Form::Shaped(shape, _) = &term.form {
+            let replaced = Self::replaced(state, term.effect.id(), shape.as_ref());
+            if !replaced.is_empty() {
+                beside.terms.retain(|t| !replaced.contains(&t.candidate));
+                // Later it is weighed as a whole.
+                let of = &self.candidates[term.candidate];
+                term.threshold = of.limit_of_shape(term.names.len());
+            }
+        }
+        let mut term = self.refine(&beside, self.stripped(&beside, term));
+        let mut terms = beside.terms;
         if term.effect.extends().is_some() && matches!(term.form, Form::Columns) {
             // Later it is weighed as a whole.
             term.threshold = threshold::regression(term.columns.len(), 1);
@@ -117,6 +127,20 @@ impl Search<'_> {
         }
         terms.push(term);
         self.refit(self.placed(state, terms), state.noise.log_walk)
+    }
+
+    /// The state without a term and without every shape that follows the same channel: beside the term it took the place that was
+    /// left, and is sought anew.
+    pub(super) fn cleared_of(&self, state: &State, i: usize) -> State {
+        let of = &state.terms[i].of;
+        let own = |t: &Term| {
+            let whole = matches!(&t.form, Form::Shaped(shape, _) if shape.whole());
+            whole && t.of.iter().any(|c| of.contains(c))
+        };
+        let each = state.terms.iter().enumerate();
+        let kept = each.filter(|(j, t)| *j != i && !own(t));
+        let kept = kept.map(|(_, t)| t.clone()).collect();
+        self.refit(kept, state.noise.log_walk)
     }
 
     /// Terms of which every shape but the last, which is new, has its best place beside the others.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use model::effect::{Covariance, Hypothesis, Regression, Shape};
 
 use super::{Candidate, Search, bands};
-use crate::fit::channel::{Form, State, Term};
+use crate::fit::channel::{Form, RIVAL_SPAN, State, Term};
 use crate::fit::likelihood::{Noise, scoring};
 use crate::fit::{scan, threshold};
 
@@ -52,6 +52,17 @@ impl Weighed<'_> {
     }
 }
 
+impl Candidate {
+    /// What a shape with so many columns has to reach. The hypotheses of an effect of which a shape is the whole share its chance.
+    pub(crate) fn limit_of_shape(&self, columns: usize) -> f64 {
+        let places = match &self.hypothesis {
+            Hypothesis::Shaped(s) if s.whole() => self.grid.len() * self.siblings,
+            _ => self.grid.len(),
+        };
+        threshold::shaped(columns, places)
+    }
+}
+
 impl Search<'_> {
     /// Best term that candidate `i` offers to `state`.
     pub(super) fn weigh(
@@ -86,7 +97,13 @@ impl Search<'_> {
 
     /// What columns offer.
     fn weigh_regression(&self, of: &Weighed<'_>, r: &Regression) -> Term {
-        let columns = [of.own.clone(), of.candidate.columns.clone()].concat();
+        let extended = |t: &&Term| of.candidate.effect.extends() == Some(t.effect.id());
+        // A shape that it stands in the place of is no part of it.
+        let shaped = |t: &Term| matches!(t.form, Form::Shaped(..));
+        let kept = of.state.terms.iter();
+        let kept = kept.filter(|t| !(shaped(t) && extended(t)));
+        let kept: Vec<usize> = kept.flat_map(|t| t.columns.iter().copied()).collect();
+        let columns = [kept, of.candidate.columns.clone()].concat();
         let lr = 2.0 * (self.panel.profile(of.walks, &columns) - of.null);
         let names = r.columns.iter().map(|c| c.parameter).collect();
         // In the place of a narrower term, only the columns beyond it are new.
@@ -94,11 +111,16 @@ impl Search<'_> {
             .state
             .terms
             .iter()
-            .filter(|t| of.candidate.effect.extends() == Some(t.effect.id()))
+            .filter(extended)
             .map(|t| t.columns.len())
             .sum();
         let new = r.columns.len().saturating_sub(held).max(1);
-        let limit = threshold::regression(new, of.candidate.siblings) + of.candidate.handicap;
+        let limit = if of.state.terms.iter().filter(extended).any(shaped) {
+            // The coordinate of a shape is a parameter too, and has earned its place.
+            0.0
+        } else {
+            threshold::regression(new, of.candidate.siblings) + of.candidate.handicap
+        };
         let mut t = of.term(
             Form::Columns,
             of.candidate.columns.clone(),
@@ -114,6 +136,11 @@ impl Search<'_> {
 
     /// What a shape offers at the best point of its grid.
     fn weigh_shaped(&self, of: &Weighed<'_>, shape: &Arc<dyn Shape>) -> Option<Term> {
+        // One that is all of its effect stands in the place of the other terms, and has to be worth the parameter.
+        let replaced = Self::replaced(of.state, of.candidate.effect.id(), shape.as_ref());
+        let of_others = |t: &&Term| !replaced.contains(&t.candidate);
+        let others = of.state.terms.iter().filter(of_others);
+        let others: Vec<usize> = others.flat_map(|t| t.columns.iter().copied()).collect();
         let (at, columns, lr) = of
             .candidate
             .grid
@@ -124,26 +151,39 @@ impl Search<'_> {
                     c,
                     2.0 * (self
                         .panel
-                        .profile(of.walks, &[of.own.clone(), c.clone()].concat())
+                        .profile(of.walks, &[others.clone(), c.clone()].concat())
                         - of.null),
                 )
             })
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
         let names: Vec<_> = shape.columns(at).iter().map(|c| c.parameter).collect();
-        let limit = threshold::shaped(names.len(), of.candidate.grid.len());
+        let limit = of.candidate.limit_of_shape(names.len());
+        let earned = of.state.terms.iter().filter(|t| !of_others(t));
+        let earned = earned.map(|t| t.threshold).sum::<f64>();
+        let limit = if earned > 0.0 {
+            limit - earned + RIVAL_SPAN
+        } else {
+            limit
+        };
         // Between the points of the grid it may be much better: what is a rival is weighed at its best.
-        let lr = if lr > limit {
-            lr.max(2.0 * (self.between(of.walks, &of.own, shape.as_ref(), at) - of.null))
+        let near = earned > 0.0 || lr > limit;
+        let lr = if near {
+            lr.max(2.0 * (self.between(of.walks, &others, shape.as_ref(), at) - of.null))
         } else {
             lr
         };
-        Some(of.term(
-            Form::Shaped(Arc::clone(shape), at),
-            columns.clone(),
-            names,
-            lr,
-            limit,
-        ))
+        let form = Form::Shaped(Arc::clone(shape), at);
+        let mut t = of.term(form, columns.clone(), names, lr, limit);
+        t.follows = shape.follows().map(str::to_owned);
+        t.of.clone_from(&of.candidate.of);
+        Some(t)
+    }
+
+    /// Candidates of the terms whose place a shape of `effect` takes.
+    pub(super) fn replaced(state: &State, effect: &str, shape: &dyn Shape) -> Vec<usize> {
+        let own = |t: &&Term| shape.whole() && t.effect.id() == effect;
+        let own = state.terms.iter().filter(own);
+        own.map(|t| t.candidate).collect()
     }
 
     /// What a step offers at its best time.
@@ -347,8 +387,10 @@ impl Search<'_> {
                         t.effect.id() != c.effect.id() || t.follows != r.follows || other(t)
                     })
             }
-            Hypothesis::Shaped(_) => {
-                !self.view.moving && state.terms.iter().all(|t| t.candidate != i)
+            Hypothesis::Shaped(s) => {
+                let extended = |t: &Term| s.whole() && t.effect.extends() == Some(c.effect.id());
+                let closed = |t: &Term| t.candidate == i || extended(t);
+                !self.view.moving && !state.terms.iter().any(closed)
             }
             _ => false,
         }

@@ -30,4 +30,16 @@ pub trait Shape: Send + Sync {
     fn beside(&self, _parameter: &str, _fixed: &[(&str, f64, &str)]) -> Option<Vec<f64>> {
         None
     }
+    /// The channel that it follows; `None` of a shape of time.
+    fn follows(&self) -> Option<&str> {
+        None
+    }
+    /// A value of the coordinate as the effect's parameter has it.
+    fn told(&self, at: f64) -> f64 {
+        at
+    }
+    /// Whether it is all that its effect does: it takes the place of the effect's other terms, and joins none.
+    fn whole(&self) -> bool {
+        false
+    }
 }

@@ -1,9 +1,14 @@
 //! The bias follows the temperature of the die.
 
+mod lag;
+
+use std::sync::Arc;
+
 use crate::effect::{
-    Column, Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Regression, Rival,
-    Stage, View, parameter, value,
+    Column, Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Regression,
+    Rival, Signal, Stage, View, columns_as_parameters, optional, parameter, value,
 };
+use crate::parameter::Parameter;
 use crate::record::Quantity;
 use crate::simulate::Simulation;
 
@@ -22,21 +27,24 @@ impl Effect for Temperature {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &[parameter(
-            "slope",
-            "deg/s/degC",
-            "change of the bias per degree",
-        )];
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("slope", "deg/s/degC", "change of the bias per degree"),
+            optional(
+                LAG,
+                "s",
+                "time constant with which the bias is behind the thermometer; below 0, with which the thermometer is behind the bias",
+            ),
+        ];
         PARAMETERS
     }
 
     fn docs(&self) -> Docs {
         Docs {
             title: "Bias follows temperature",
-            physics: "b(t) = slope (T(t) - mean T). The mechanical and electrical offsets of the gyro drift with its die temperature; the ADIS16250 data sheet gives 0.03 deg/s/degC typically.",
+            physics: "b(t) = slope (T(t) - mean T). Where a lag is stated, T is the reading behind a filter of that time constant (a die that warms later than the thermometer), or, below 0, T + |lag| dT/dt, what a thermometer that warms later than the die is on its way to. The mechanical and electrical offsets of the gyro drift with its die temperature; the ADIS16250 data sheet gives 0.03 deg/s/degC typically.",
             excitation: "A temperature that moves by at least half a degree, best up and down again (a heater cycle).",
-            test: "Least squares on the smoothed temperature channel, random walk refitted.",
-            remedy: "Subtract the slope times the measured temperature from the rate, or hold the temperature steady.",
+            test: "Least squares on the smoothed temperature channel, at once and over a grid of lags either way, refined; size and lag averaged over each other; random walk refitted.",
+            remedy: "Subtract the slope times the measured temperature, filtered by the lag where there is one, from the rate, or hold the temperature steady.",
             figure: "Rate in time blocks, the other terms taken out, against temperature: a straight line.",
             example: Example::new(Plot::RateAgainst("temp_x"), &[("slope", 0.08)])
                 .in_a_world(&[("heater_degc", 6.0)]),
@@ -70,14 +78,32 @@ impl Effect for Temperature {
     }
 
     fn hypotheses(&self, view: &View<'_>) -> Result<Vec<Hypothesis>, String> {
-        Ok(vec![Hypothesis::Regression(Regression {
+        let signal = moving(view)?;
+        let at_once = Hypothesis::Regression(Regression {
             columns: vec![Column {
                 parameter: "slope",
-                values: centred(view)?.0,
+                values: lag::about_mean(signal.smooth.to_vec()),
             }],
             fixed: vec![],
-            follows: Some(centred(view)?.1),
-        })])
+            follows: Some(signal.name.clone()),
+        });
+        let lagging = [false, true].map(|ahead| lag::Lagging {
+            temperature: Arc::clone(&signal.smooth),
+            channel: signal.name.clone(),
+            rate_hz: view.rate_hz,
+            ahead,
+        });
+        let lagging = lagging.into_iter().filter(lag::Lagging::any);
+        let lagging = lagging.map(|l| Hypothesis::Shaped(Arc::new(l)));
+        Ok(std::iter::once(at_once).chain(lagging).collect())
+    }
+
+    fn describe(&self, found: &Found) -> Parameters {
+        let mut all = columns_as_parameters(self.parameters(), found);
+        if let Some((lag, error)) = found.location.first() {
+            all.insert(LAG.into(), Parameter::estimated(*lag, *error, "s"));
+        }
+        all
     }
 
     fn excited_by(&self) -> &'static [&'static str] {
@@ -90,24 +116,25 @@ impl Effect for Temperature {
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
         let slope = value(parameters, "slope");
+        let lag = value(parameters, LAG);
+        let rate_hz = simulation.rate_hz;
         for &axis in channels {
-            let mean =
-                simulation.temperature[axis].iter().sum::<f64>() / simulation.samples.max(1) as f64;
-            for (rate, t) in simulation.rate[axis]
-                .iter_mut()
-                .zip(&simulation.temperature[axis])
-            {
-                *rate += slope * (t - mean);
+            let course = lag::about_mean(lag::behind(&simulation.temperature[axis], lag, rate_hz));
+            for (rate, t) in simulation.rate[axis].iter_mut().zip(course) {
+                *rate += slope * t;
             }
         }
     }
 }
 
+/// The parameter that says how far the bias is behind.
+const LAG: &str = "lag";
+
 /// Smallest swing of the temperature that says anything, degC.
 pub(super) const LEAST_SWING: f64 = 0.5;
 
-/// The temperature minus its mean, and the name of its channel.
-fn centred(view: &View<'_>) -> Result<(Vec<f64>, String), String> {
+/// The temperature of the channel, where it moves enough.
+fn moving<'a>(view: &'a View<'_>) -> Result<&'a Signal, String> {
     let signal = view
         .signal(Quantity::Temp)
         .ok_or("no temperature channel: record the gyro's temperature")?;
@@ -118,9 +145,5 @@ fn centred(view: &View<'_>) -> Result<(Vec<f64>, String), String> {
             signal.name
         ));
     }
-    let mean = signal.smooth.iter().sum::<f64>() / signal.smooth.len() as f64;
-    Ok((
-        signal.smooth.iter().map(|t| t - mean).collect(),
-        signal.name.clone(),
-    ))
+    Ok(signal)
 }

@@ -13,7 +13,7 @@ mod show;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use imu_stand::link::Link;
+use imu_stand::link::{Link, LinkError};
 use miette::Result;
 use wire::Command;
 
@@ -118,12 +118,23 @@ pub(crate) struct Session {
 impl Session {
     /// Prints the set-up as it now is, and writes it where JSON was asked for.
     fn show_info(&mut self) -> Result<()> {
-        let info = Info::of(&self.link.ask_hello()?, self.link.name());
+        let mut info = Info::of(&self.link.ask_hello()?, self.link.name());
+        info.correction = stored_correction(&mut self.link)?;
         super::write_json(self.json.as_ref(), &info)?;
         if !self.quiet {
             say!("{}", info.text().trim_end());
         }
         Ok(())
+    }
+}
+
+/// Number of the stored correction, if there is one; a board that does not know of corrections has none.
+pub(super) fn stored_correction(link: &mut Link) -> Result<Option<u16>> {
+    let (other, row) = (false, 0);
+    match link.ask(Command::GetCorrection { other, row }) {
+        Ok(reply) => Ok((reply.value != 0).then(|| reply.detail[1] as u16)),
+        Err(LinkError::Refused { .. }) => Ok(None),
+        Err(error) => Err(error.into()),
     }
 }
 

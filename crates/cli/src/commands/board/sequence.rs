@@ -167,17 +167,8 @@ pub fn run(session: &mut Session, sequence: &Sequence) -> Result<()> {
 fn show(outcome: &Outcome) {
     say!("what the sequence found, with 95 % intervals");
     for found in &outcome.identified {
-        let half = found.size.std_error.map_or(f64::NAN, |error| 1.96 * error);
-        // A share has none.
-        let unit = found.size.unit.as_str();
-        let line = format!(
-            "  {:<7} {:<48} {:>10.5} +- {half:.5} {}",
-            found.channel,
-            found.what,
-            found.size.value,
-            if unit == "1" { "" } else { unit }
-        );
-        say!("{}", line.trim_end());
+        let size = text::answer::with_interval(&found.size).replace('\u{a0}', " ");
+        say!("  {:<7} {:<28} {size}", found.channel, found.what);
     }
     say!("what this sequence cannot tell");
     for what in &outcome.not_identified {

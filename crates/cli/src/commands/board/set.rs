@@ -159,12 +159,19 @@ fn unsaved(session: &Session) {
 /// Longest period of the board's timer, ticks; slower rates take every second, third or fourth.
 const LONGEST_PERIOD: f64 = 62_500.0;
 
+/// Rates that the gyros and the board's timer have, Hz.
+const LEAST_HZ: f64 = 1.0;
+const MOST_HZ: f64 = 256.0;
+
 /// Share of a line's capacity that samples may take: the rest is for health, hello, replies.
 const LINE_SHARE: f64 = 0.85;
 
 fn rate(hello: &Hello, hz: f64) -> Result<Command> {
-    if !(hz > 0.0 && hz.is_finite()) {
-        miette::bail!(help = "write `board set rate 20`", "{hz} is no sample rate");
+    if !(LEAST_HZ..=MOST_HZ).contains(&hz) {
+        miette::bail!(
+            help = "write `board set rate 20`",
+            "the board samples at {LEAST_HZ} to {MOST_HZ} Hz, not at {hz} Hz"
+        );
     }
     let ticks = (1e9 / f64::from(hello.tick_ns.max(1)) / hz).round();
     // A period that the 16-bit timer cannot hold is that many shorter ones.
@@ -238,8 +245,13 @@ fn set_baud(session: &mut Session, hello: &Hello, baud: u32) -> Result<()> {
     };
     let rate = super::show::rate_hz(hello).unwrap_or(0.0);
     if rate * Sample::FRAME_LEN as f64 * 10.0 > LINE_SHARE * f64::from(baud) {
+        let fits = (LINE_SHARE * f64::from(baud) / (Sample::FRAME_LEN as f64 * 10.0)).floor();
+        let help = match fits >= 1.0 {
+            true => format!("lower the rate first: `imu-stand board set rate {fits}`"),
+            false => "the board samples at 1 Hz or faster: a faster line, `imu-stand board set baud 38400`, carries that".to_owned(),
+        };
         miette::bail!(
-            help = "lower the rate first: `imu-stand board set rate 20`",
+            help = help,
             "{baud} baud do not carry the samples of {rate:.1} Hz"
         );
     }

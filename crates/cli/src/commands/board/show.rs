@@ -50,6 +50,8 @@ pub struct Info {
     pub bias_dps: [f64; 3],
     /// x, y, z.
     pub scale_dps_per_count: [f64; 3],
+    /// Number of the stored correction; null where none is.
+    pub correction: Option<u16>,
 }
 
 /// Full scale of a gyro by SENS/AVG bits 10:8, deg/s.
@@ -112,6 +114,7 @@ impl Info {
             },
             bias_dps: hello.bias.map(|b| f64::from(b) / Q16),
             scale_dps_per_count: hello.scale.map(|s| f64::from(s) / Q24),
+            correction: None,
         }
     }
 
@@ -150,6 +153,9 @@ impl Info {
             1u32 << self.gyro_filter.min(31)
         );
         let _ = writeln!(out, "  acc          {} g", number(self.acc_range_g));
+        if let Some(number) = self.correction {
+            let _ = writeln!(out, "  correction   {number:#06x}, stored");
+        }
         let _ = writeln!(out, "               bias deg/s   scale deg/s/count");
         for ((axis, bias), scale) in ["x", "y", "z"]
             .iter()

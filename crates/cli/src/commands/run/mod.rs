@@ -327,7 +327,7 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
     let found = found.map_err(super::explain)?;
     let comparison = compare(&hidden, &found.diagnosis);
     let answer = Answer {
-        screen: text::diagnosis(&found),
+        screen: text::diagnosis(&found, read.record.header.base),
         diagnosis: found.diagnosis.clone(),
         comparison,
     };

@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use diagnosis::result::{Alternative, Gain};
+use diagnosis::result::{Alternative, Consequence, Gain};
 
 use super::*;
 
@@ -202,5 +202,44 @@ fn what_is_left_open_is_said_with_the_experiment_that_decides() {
     assert_eq!(
         open_question(&f).unwrap(),
         "This record cannot tell it from flicker. To decide: a longer record."
+    );
+}
+
+#[test]
+fn a_count_and_its_interval_are_whole_numbers() {
+    let of = |value: f64, error: Option<f64>| {
+        let f = finding("stale_samples", &[("count", value, error, "1")]);
+        (headline(&f).replace('\u{a0}', " "), brief(&f))
+    };
+    let (line, short) = of(1774.0, Some(0.0172));
+    assert!(line.ends_with(", count 1774"), "{line}");
+    assert_eq!(short, "stale_samples on gyro_x 1774");
+    let (line, _) = of(1714.0, Some(1.26));
+    assert!(line.ends_with("count 1714 (95 %: 1712 to 1716)"), "{line}");
+    assert!(of(2.0, Some(1.5)).0.ends_with("count 2 (95 %: 0 to 5)"));
+    assert!(of(30.0, None).0.ends_with("count 30"));
+}
+
+#[test]
+fn a_limit_is_told_once() {
+    let changed = |largest_change: f64| Consequence {
+        largest_change,
+        ..Consequence::default()
+    };
+    let said = consequence_of(&changed(3e-5), true);
+    assert!(said.ends_with("a deviation by less than 0.01 %."), "{said}");
+    let said = consequence_of(&changed(0.12), true);
+    assert!(said.ends_with("a deviation by up to 12 %."), "{said}");
+}
+
+#[test]
+fn nobody_asks_again_what_the_base_did() {
+    let f = finding("base_motion", &[("peak", 3.0, None, "deg/s")]);
+    let said = remedy(&f, None).expect("a remedy");
+    assert!(said.ends_with("--base static."), "{said}");
+    let said = remedy(&f, Some(Base::Moving)).expect("a remedy");
+    assert!(
+        said.contains("does not move") && !said.contains("--base"),
+        "{said}"
     );
 }

@@ -84,8 +84,16 @@ impl Recorded {
         if let Some(left) = &self.left {
             let _ = write!(
                 line,
-                "; by {:.0} s {left}, and nine of ten records of {:.0} s would bring it within {NEAR} times that (`--longest {:.0}`)",
-                self.seconds, left.seconds, left.seconds
+                "; by {:.0} s they would be off by {} deg over {:.0} s in the mean, where the noise alone leaves {}: for nine of ten \
+                 records within {NEAR} times their noise {} on {} takes {:.0} s (`--longest {:.0}`)",
+                self.seconds,
+                short(left.expected_deg),
+                left.span_s,
+                short(left.floor_deg),
+                left.cause,
+                left.channel,
+                left.seconds,
+                left.seconds
             );
         }
         Some(text::item("first record: ", &line).trim_start().to_owned())
@@ -329,4 +337,38 @@ fn flags(judged: &Judged) -> Vec<String> {
         ));
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_first_record_is_still_too_short_for_is_no_contradiction() {
+        let by = |seconds: f64, expected_deg: f64| Needed {
+            seconds,
+            cause: "temperature".to_owned(),
+            channel: "gyro_x",
+            span_s: 600.0,
+            expected_deg,
+            floor_deg: 14.4,
+        };
+        let recorded = Recorded {
+            seconds: 7200.0,
+            needed: Some(by(7200.0, 23.0)),
+            needed_by_s: 600.0,
+            left: Some(by(14_040.0, 14.4)),
+            ..Recorded::new(600.0)
+        };
+        let line = recorded.line().expect("it was taken again");
+        let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            line.ends_with(
+                "by 7200 s they would be off by 14.4 deg over 600 s in the mean, where the noise alone leaves 14.4: for nine of ten \
+                 records within 1.15 times their noise temperature on gyro_x takes 14040 s (`--longest 14040`)"
+            ),
+            "{line}"
+        );
+        assert_eq!(Recorded::new(600.0).line(), None);
+    }
 }
