@@ -34,6 +34,8 @@ const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
 pub(crate) const FOLLOWED: f64 = 0.02;
 /// Half widths off a band up to which what lies beside it is looked at.
 const BESIDE: f64 = 3.0 * REACH;
+/// Standard errors by which an accelerometer reads more where a band is than beside it, where the band knows of it: one in a thousand.
+const MORE: f64 = 3.0;
 /// Fewest values of the envelope.
 const LEAST: usize = 64;
 
@@ -125,8 +127,9 @@ pub(crate) struct Standing {
 }
 
 impl Standing {
-    /// The part of the energy about the middle that is more than beside it.
-    fn share(energies: impl Iterator<Item = (f64, f64)>) -> f64 {
+    /// The part of the energy about the middle that is more than beside it, and its standard error where there is no more; energies
+    /// are squares of normal values.
+    fn share(energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
         let (mut near, mut beside) = ([0.0; 2], [0.0; 2]);
         for (off, energy) in energies.filter(|(off, _)| off.abs() <= BESIDE) {
             let sums = if off.abs() <= REACH {
@@ -136,7 +139,8 @@ impl Standing {
             };
             *sums = [sums[0] + energy, sums[1] + 1.0];
         }
-        1.0 - beside[0] / beside[1] * near[1] / near[0]
+        let share = 1.0 - beside[0] / beside[1] * near[1] / near[0];
+        (share, (2.0 / near[1] + 2.0 / beside[1]).sqrt())
     }
 
     /// Height over the top, some half widths off it.
@@ -255,8 +259,9 @@ fn coherent(
 fn shakes(own: &Moves, coefficients: &[f64], part: f64) -> bool {
     let energies = coefficients.iter().enumerate().skip(1);
     let energies = energies.map(|(k, c)| ((k as f64 - own.middle()) / own.half, c * c));
-    Standing::of(energies.clone(), std::f64::consts::SQRT_2).is_some()
-        || (part > FOLLOWED && Standing::share(energies) > 0.5 * part)
+    let (share, error) = Standing::share(energies.clone());
+    Standing::of(energies, std::f64::consts::SQRT_2).is_some()
+        || (part > FOLLOWED && share > (0.5 * part).max(MORE * error))
 }
 
 /// Whether accelerometers read what a band is: they are coherent with it, and have a peak there.
