@@ -63,8 +63,8 @@ pub(super) fn is_locked(own: &Moves, others: &[&Moves]) -> bool {
         each.filter_map(|powers| locked(own, o, *powers))
     });
     let all: Vec<f64> = all.collect();
-    let least = all.iter().copied().fold(1.0, f64::min);
-    least * (all.len() as f64) < CheckId::BandAlone.level()
+    let count = all.len() as f64;
+    (all.iter()).any(|p| p * count < CheckId::BandAlone.level())
 }
 
 /// The claim of a band that is told as `named`: that it is a sine, whose `harmonics` have these chances, and knows nothing of the
