@@ -6,7 +6,7 @@
 //! half width h in white noise, k times as high as that, the best estimate is a Lorentzian filter of half width h sqrt(1 + k) either
 //! way in time (Wiener).
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use crate::effect::{ParameterSpec, Parameters, optional};
 use crate::effects::correlated_noise::WITH;
@@ -124,9 +124,11 @@ pub struct Felt {
     turning: Vec<[f64; 2]>,
 }
 
-/// Half widths to either side of an oscillation at which the noise beside it is read: what a filter of its width has of it there is a
-/// 226th of that at the centre, less than noise that a hundredth of an oscillation stands in.
-const BESIDE: f64 = 30.0;
+/// Half widths to either side of an oscillation at which the noise beside it is read, at least and at most, and the part of the way to
+/// 0 and to half the sample rate up to which they are more: what a filter of its width has at 30 of a Lorentzian is a 226th of that at the
+/// centre, but a 900th of a tone that stays nearer, which hides the noise that a narrow one stands in.
+const BESIDE: (f64, f64) = (30.0, 300.0);
+const WAY: f64 = 0.5;
 /// Least white noise beside an oscillation, over its variance: its skirts hide less.
 const LEAST_NOISE: f64 = 1e-3;
 
@@ -190,9 +192,11 @@ impl<'a> Read<'a> {
         // variance; away from the centre less by a Lorentzian of twice that half width.
         let at = |centre: f64| Pole::new(centre, half_width).passes(values, mean);
         let [middle, white] = at(omega);
-        let sides = [-BESIDE, BESIDE].map(|off| at(omega + off * half_width)[0]);
+        let beside = WAY * omega.min(PI - omega) / half_width;
+        let beside = beside.clamp(BESIDE.0, BESIDE.1);
+        let sides = [-beside, beside].map(|off| at(omega + off * half_width)[0]);
         let side = sides[0].min(sides[1]);
-        let reaches = (1.0 + (0.5 * BESIDE).powi(2)).recip();
+        let reaches = (1.0 + (0.5 * beside).powi(2)).recip();
         let variance = 4.0 * (middle - side) / (1.0 - reaches);
         let noise = (side - reaches * middle) / (1.0 - reaches) / white;
         let noise = noise.max(LEAST_NOISE * variance);
@@ -240,13 +244,16 @@ fn read_from(all: &[Read<'_>], omega: f64, half_width: f64) -> (Vec<[f64; 2]>, f
         at = back.next(at, *z);
         *z = at;
     }
-    // What is known of a variance of 1 it has in this record.
+    // What is known of a variance of 1 it has in this record, in either quadrature: what a wide filter has of the negative frequencies
+    // adds to one and takes from the other.
     let known = (ratio - 1.0) / ratio;
-    let squares = turning.iter().map(|z| z[0] * z[0] + z[1] * z[1]);
-    let found = 0.5 * squares.sum::<f64>() / turning.len().max(1) as f64;
-    let scale = (known / found.max(f64::MIN_POSITIVE)).sqrt();
+    let scale = [0, 1].map(|part| {
+        let squares = turning.iter().map(|z| z[part] * z[part]);
+        let found = squares.sum::<f64>() / turning.len().max(1) as f64;
+        (known / found.max(f64::MIN_POSITIVE)).sqrt()
+    });
     for z in &mut turning {
-        *z = z.map(|v| scale * v);
+        *z = [scale[0] * z[0], scale[1] * z[1]];
     }
     (turning, known)
 }

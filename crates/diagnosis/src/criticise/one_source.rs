@@ -10,7 +10,7 @@ mod pair;
 use std::f64::consts::{SQRT_2, TAU};
 use std::sync::Arc;
 
-use model::effect::{Parameters, Signal};
+use model::effect::{Parameters, Peak, Signal};
 use model::effects::effect;
 use model::one_source;
 use model::record::Quantity;
@@ -40,8 +40,9 @@ struct Band {
     terms: Vec<usize>,
     omega: f64,
     half_width: f64,
-    /// Of a tone that was tracked: its phase.
+    /// Of a tone that was tracked: its phase, and the peak that it has by what was told of it.
     path: Option<Arc<Path>>,
+    told: Option<Peak>,
 }
 
 impl Band {
@@ -127,9 +128,11 @@ impl OneSource {
         let each = z[1..].iter().zip(&own[1..]).zip(g);
         let (mut product, mut square) = (Complex::<f64>::default(), 0.0);
         for ((z, e), g) in each {
-            let x = z / (s.state.solution.white * g).sqrt();
-            product += x.conj() * e;
-            square += x.norm_sqr();
+            let of_noise = s.state.solution.white * g;
+            // The skirts of the density that stands for a tone are none of a tone that was tracked.
+            let weight = first.band.path.as_ref().map_or(of_noise.recip(), |_| 1.0);
+            product += weight * z.conj() * e * of_noise.sqrt();
+            square += weight * z.norm_sqr();
         }
         Some((product.norm() / square / rms).min(1.0))
     }
@@ -203,7 +206,8 @@ fn bands(axis: usize, s: &Searched<'_>) -> Vec<Band> {
     let terms = s.state.terms.iter().enumerate();
     let first = terms.filter(|(_, t)| t.is_band() && !t.is_part());
     let all = first.filter_map(|(i, t)| {
-        let peak = t.peak()?;
+        let told = told(t, s.state.solution.white);
+        let peak = told.or_else(|| t.peak())?;
         let number = t.cluster.map(|c| c.number);
         let of_it = |o: &Term| number.is_some() && o.cluster.map(|c| c.number) == number;
         let others = s.state.terms.iter().enumerate();
@@ -214,9 +218,23 @@ fn bands(axis: usize, s: &Searched<'_>) -> Vec<Band> {
             omega: peak.omega,
             half_width: peak.half_width,
             path: t.path.clone(),
+            told,
         })
     });
     all.collect()
+}
+
+/// The peak of a tone that was tracked, of which what was fitted to its spectrum beside other noise tells little.
+fn told(t: &Term, white: f64) -> Option<Peak> {
+    t.path.as_ref()?;
+    let [(amplitude, _), (omega, _), (half_width, _), ..] = t.stated.as_deref()? else {
+        return None;
+    };
+    Some(Peak {
+        omega: *omega,
+        half_width: *half_width,
+        variance: 0.5 * amplitude * amplitude / white,
+    })
 }
 
 /// Angular frequencies of the transform of so many samples, without 0 and the highest.
@@ -225,19 +243,37 @@ fn frequencies(samples: usize) -> impl Iterator<Item = f64> {
     (1..samples.div_ceil(2)).map(move |k| step * k as f64)
 }
 
-/// The part of the standard deviation of an axis that a band makes, at each frequency.
-fn weights(s: &Searched<'_>, band: &Band) -> Vec<f64> {
+/// The residual of an axis with a band in it, transformed and of variance 1 at each frequency, and the part of its standard deviation that
+/// the band makes.
+fn unit(
+    s: &Searched<'_>,
+    band: &Band,
+    planner: &mut FftPlanner<f64>,
+) -> (Vec<Complex<f64>>, Vec<f64>) {
     let omega: Vec<f64> = frequencies(s.e.len()).collect();
-    let all = s.state.noise.through(omega.iter().copied());
+    let by = s.state.noise.through(omega.iter().copied());
     let at = model::effect::Frequencies::at(omega);
-    let mut own = vec![0.0; all.len()];
-    for i in &band.terms {
-        if let Form::Covariance(process, theta) = &s.state.terms[*i].form {
-            let density = process.density(theta, &at);
-            own.iter_mut().zip(density).for_each(|(o, d)| *o += d);
+    let (mut own, mut all) = (vec![0.0; by.len()], by.clone());
+    for (k, i) in band.terms.iter().enumerate() {
+        let Form::Covariance(process, theta) = &s.state.terms[*i].form else {
+            continue;
+        };
+        let fitted = process.density(theta, &at);
+        let told = band.told.filter(|_| k == 0).and_then(|p| process.about(&p));
+        let told = told.map(|(process, theta)| process.density(&theta, &at));
+        let each = own.iter_mut().zip(&mut all).zip(fitted).enumerate();
+        for (k, ((own, all), fitted)) in each {
+            let density = told.as_ref().map_or(fitted, |d| d[k]);
+            *own += density;
+            *all += density - fitted;
         }
     }
-    own.iter().zip(all).map(|(o, g)| (o / g).sqrt()).collect()
+    let mut values = transformed(&band.seen(s), planner);
+    for ((v, by), all) in values[1..].iter_mut().zip(&by).zip(&all) {
+        *v *= (by / all).sqrt();
+    }
+    let weights = own.iter().zip(all).map(|(o, g)| (o / g).sqrt()).collect();
+    (values, weights)
 }
 
 /// A residual transformed, of variance 1 at each frequency.
@@ -265,21 +301,17 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
         if !shakes && !left.iter().any(near) {
             continue;
         }
-        let own = transformed(&first.seen(&searched[first.axis]), &mut planner);
-        let of_first = weights(&searched[first.axis], &first);
+        let (own, of_first) = unit(&searched[first.axis], &first, &mut planner);
         let mut others: Vec<Member> = vec![];
         while let Some(k) = (0..left.len())
             .find(|k| near(&left[*k]) && others.iter().all(|m| m.band.axis != left[*k].axis))
         {
             let band = left.remove(k);
             let s = &searched[band.axis];
-            let weights = weights(s, &band);
+            let (there, weights) = unit(s, &band, &mut planner);
             let (coherence, phase, lr) = match (&first.path, &band.path) {
                 (Some(one), Some(other)) => of_paths(one, other, s.e.len()),
-                _ => {
-                    let there = transformed(&band.seen(s), &mut planner);
-                    Pair::new(&own, &there, &of_first, &weights).estimate()
-                }
+                _ => Pair::new(&own, &there, &of_first, &weights).estimate(),
             };
             if is_one(coherence.0, lr) {
                 others.push(Member {

@@ -240,6 +240,8 @@ fn smallest(s: &Searched<'_>, meter: &Meter<'_>, c: &Candidate) -> Option<Smalle
     let first = c.effect.parameters().first()?.name;
     match &c.hypothesis {
         Hypothesis::Regression(r) => of_regression(s, meter, c, r),
+        // The limit of the same at once says it.
+        Hypothesis::Shaped(shape) if shape.whole() => None,
         Hypothesis::Shaped(shape) => of_shape(s, meter, c, shape.as_ref()),
         Hypothesis::Step => of_step(s, meter),
         Hypothesis::Line => Some(of_line(s, meter)),

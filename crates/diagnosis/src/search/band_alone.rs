@@ -56,6 +56,17 @@ fn locked(a: &Moves, b: &Moves, (j, k): (i32, i32)) -> Option<f64> {
     Some(stands_out(between(n, turns, both)).0)
 }
 
+/// Whether the phase of a band is locked to that of one of the others.
+pub(super) fn is_locked(own: &Moves, others: &[&Moves]) -> bool {
+    let all = others.iter().flat_map(|o| {
+        let each = LOCKED.iter();
+        each.filter_map(|powers| locked(own, o, *powers))
+    });
+    let all: Vec<f64> = all.collect();
+    let count = all.len() as f64;
+    (all.iter()).any(|p| p * count < CheckId::BandAlone.level())
+}
+
 /// The claim of a band that is told as `named`: that it is a sine, whose `harmonics` have these chances, and knows nothing of the
 /// other bands.
 pub(super) fn claim(

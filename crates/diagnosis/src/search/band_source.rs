@@ -34,6 +34,8 @@ const DEGREES: f64 = 2.0 * (2.0 * SMOOTHED as f64 + 1.0);
 pub(crate) const FOLLOWED: f64 = 0.02;
 /// Half widths off a band up to which what lies beside it is looked at.
 const BESIDE: f64 = 3.0 * REACH;
+/// Standard errors by which an accelerometer reads more where a band is than beside it, where the band knows of it: one in a thousand.
+const MORE: f64 = 3.0;
 /// Fewest values of the envelope.
 const LEAST: usize = 64;
 
@@ -125,6 +127,22 @@ pub(crate) struct Standing {
 }
 
 impl Standing {
+    /// The part of the energy about the middle that is more than beside it, and its standard error where there is no more; energies
+    /// are squares of normal values.
+    fn share(energies: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+        let (mut near, mut beside) = ([0.0; 2], [0.0; 2]);
+        for (off, energy) in energies.filter(|(off, _)| off.abs() <= BESIDE) {
+            let sums = if off.abs() <= REACH {
+                &mut near
+            } else {
+                &mut beside
+            };
+            *sums = [sums[0] + energy, sums[1] + 1.0];
+        }
+        let share = 1.0 - beside[0] / beside[1] * near[1] / near[0];
+        (share, (2.0 / near[1] + 2.0 / beside[1]).sqrt())
+    }
+
     /// Height over the top, some half widths off it.
     pub(crate) fn shape(off: f64) -> f64 {
         (1.0 + off * off).recip()
@@ -148,7 +166,13 @@ impl Standing {
         let share = near[2] / beside[2];
         let more = |k: usize| near[k] - share * beside[k];
         let height = more(0) / more(1);
-        let level = (beside[0] - height * beside[1]) / beside[2];
+        // A tone has not the skirts of its shape: those would be more than there is.
+        let skirts = (beside[0] - height * beside[1]) / beside[2];
+        let level = if skirts > 0.0 {
+            skirts
+        } else {
+            beside[0] / beside[2]
+        };
         let error = spread * level * (near[2] * (1.0 + share)).sqrt() / more(1);
         let z = height / error;
         let stands = level > 0.0 && z > 0.0 && tails::normal_tail(z) < threshold::false_alarm();
@@ -229,6 +253,31 @@ fn coherent(
     )
 }
 
+/// Whether what shakes the band shakes an accelerometer, of which these are the coefficients: it then reads a peak of its own there. What
+/// follows an accelerometer has a `part` of its energy, and no peak is needed for that; of a peak that is too small to stand out, what is
+/// more than beside it is nearer to that part than to none.
+fn shakes(own: &Moves, coefficients: &[f64], part: f64) -> bool {
+    let energies = coefficients.iter().enumerate().skip(1);
+    let energies = energies.map(|(k, c)| ((k as f64 - own.middle()) / own.half, c * c));
+    let (share, error) = Standing::share(energies.clone());
+    Standing::of(energies, std::f64::consts::SQRT_2).is_some()
+        || (part > FOLLOWED && share > (0.5 * part).max(MORE * error))
+}
+
+/// Whether accelerometers read what a band is: they are coherent with it, and have a peak there.
+pub(super) fn is_read(own: &Moves, signals: &[Signal], felt: &[(&str, Vec<f64>)]) -> bool {
+    let planner = &mut FftPlanner::new();
+    felt.iter().any(|(name, coefficients)| {
+        let mut named = signals.iter().filter(|s| s.name == *name);
+        if !named.any(|s| s.quantity == Quantity::Acc) {
+            return false;
+        }
+        let there = envelope_of(&coefficients[own.places.clone()], planner);
+        let (p, part) = coherent(&own.envelope, &there, planner);
+        p < CheckId::BandSource.level() && part > FOLLOWED && shakes(own, coefficients, part)
+    })
+}
+
 /// The claim of a band that is told as `named`: that its pitch and its size follow nothing that was recorded, and that it is none
 /// of what was `felt`, of channels with their coefficients.
 pub(super) fn claim(
@@ -270,20 +319,14 @@ pub(super) fn claim(
             }
         }
     }
-    let shakes = |name: &str, coefficients: &[f64]| {
-        let mut named = signals.iter().filter(|s| s.name == name);
-        // What an accelerometer reads as a peak of its own shakes both: it is no channel that the band follows.
-        let energies = coefficients.iter().enumerate().skip(1);
-        let energies = energies.map(|(k, c)| ((k as f64 - own.middle()) / own.half, c * c));
-        named.any(|s| s.quantity == Quantity::Acc)
-            && Standing::of(energies, std::f64::consts::SQRT_2).is_some()
-    };
     for (name, coefficients) in felt {
-        if shakes(name, coefficients) {
-            continue;
-        }
         let there = envelope_of(&coefficients[own.places.clone()], planner);
         let (p, part) = coherent(&own.envelope, &there, planner);
+        let mut named = signals.iter().filter(|s| s.name == *name);
+        let of_acceleration = named.any(|s| s.quantity == Quantity::Acc);
+        if of_acceleration && shakes(own, coefficients, part) {
+            continue;
+        }
         asked += 1;
         if part > FOLLOWED && least.as_ref().is_none_or(|l| p < l.0) {
             least = Some((p, name, "phase"));

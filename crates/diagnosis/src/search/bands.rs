@@ -286,6 +286,14 @@ impl Search<'_> {
             );
             let lr = 2.0 * (state.solution.log_likelihood - rest.solution.log_likelihood);
             let lr = self.of_read() * lr;
+            let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
+            let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
+            // A tone that accelerometers read is a motion of the stand, harmonics and all; and what is locked to another is none that
+            // noise drives.
+            let is_read = (moves[number].as_ref())
+                .is_some_and(|own| band_source::is_read(own, self.view.signals, &felt));
+            let is_harmonic = is_read
+                && (moves[number].as_ref()).is_some_and(|own| band_alone::is_locked(own, &others));
             let harmonics = moves[number].as_ref();
             let harmonics = harmonics.map_or(vec![], |own| self.harmonics(state, &cluster, own));
             for (place, i) in cluster.iter().enumerate() {
@@ -293,12 +301,12 @@ impl Search<'_> {
                 t.cluster = Some(Cluster { number, place, lr });
                 if let Some(seen) = &seen {
                     let [noise, steady] = [t.candidate, tone].map(|c| self.candidates[c].effect);
-                    let is_tone = seen.odds > 0.0;
+                    let is_tone = seen.odds > 0.0 || is_harmonic;
                     if is_tone {
                         t.effect = steady;
                         t.candidate = tone;
                     }
-                    if seen.odds.abs() < envelope::OPEN {
+                    if seen.odds.abs() < envelope::OPEN && !is_harmonic {
                         let other = if is_tone { noise } else { steady };
                         t.alternatives.push((other, -seen.odds.abs()));
                     }
@@ -306,13 +314,12 @@ impl Search<'_> {
                 if place == 0 && (seen.is_some() || tracked) {
                     let named = t.effect.id();
                     t.claims.extend(seen.as_ref().map(|s| s.claim(named)));
-                    let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
-                    let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
                     let source = moves[number]
                         .as_ref()
                         .and_then(|own| band_source::claim(own, self.view.signals, &felt, named));
                     let alone = moves[number]
                         .as_ref()
+                        .filter(|_| !(is_read && t.candidate == tone))
                         .and_then(|own| band_alone::claim(own, &others, &harmonics, named));
                     t.claims.extend(source.into_iter().chain(alone));
                 }

@@ -2,6 +2,8 @@
 //!
 //! A row says what it is asked of and what it looks for. Any row that holds withdraws the name; the rows do not know each other.
 
+use model::effect::Peak;
+
 use super::Doubt;
 use super::facts::{Facts, LEFT, generic};
 use super::of_band::explains;
@@ -206,14 +208,26 @@ fn unlike(f: &Facts<'_>) -> bool {
     CheckId::OF_PROCESS.into_iter().any(|id| f.fails(id))
 }
 
-/// Whether a channel has more bands than separate causes make: they are one structure.
+/// Whether a channel has more bands than separate causes make: they are one structure. Harmonics are one with the lowest of them.
 fn crowded(f: &Facts<'_>) -> bool {
-    let bands =
-        f.s.state
-            .terms
-            .iter()
-            .filter(|t| t.is_band() && !t.is_part());
-    bands.count() > MOST_ALIKE
+    let bands = f.s.state.terms.iter();
+    let bands = bands.filter(|t| t.is_band() && !t.is_part());
+    let mut peaks: Vec<Peak> = bands.filter_map(Term::peak).collect();
+    peaks.sort_by(|a, b| a.omega.total_cmp(&b.omega));
+    let mut alone: Vec<Peak> = vec![];
+    for peak in peaks {
+        if !alone.iter().any(|low| is_harmonic(&peak, low)) {
+            alone.push(peak);
+        }
+    }
+    alone.len() > MOST_ALIKE
+}
+
+/// Whether a band lies at a multiple of a lower one, as near as their widths tell.
+fn is_harmonic(band: &Peak, low: &Peak) -> bool {
+    let order = (band.omega / low.omega).round();
+    let off = (band.omega - order * low.omega).abs();
+    order >= 2.0 && off < order * low.half_width && band.half_width < 0.5 * low.omega
 }
 
 /// Why the name of a term is not given, by itself.
