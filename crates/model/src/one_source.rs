@@ -124,10 +124,10 @@ pub struct Felt {
     turning: Vec<[f64; 2]>,
 }
 
-/// Half widths to either side of an oscillation at which the noise beside it is read, at least and at most, and the part of the way to
-/// 0 and to half the sample rate up to which they are more: what a filter of its width has at 30 of a Lorentzian is a 226th of that at the
-/// centre, but a 900th of a tone that stays nearer, which hides the noise that a narrow one stands in.
-const BESIDE: (f64, f64) = (30.0, 300.0);
+/// Half widths to either side of an oscillation at which the noise beside it is read, at most, and the part of the way to 0 and to half the
+/// sample rate that they are at most: of a Lorentzian a filter of its width has there what is known and taken off, but of a tone, which
+/// stays nearer, less.
+const BESIDE: f64 = 300.0;
 const WAY: f64 = 0.5;
 /// Least white noise beside an oscillation, over its variance: its skirts hide less.
 const LEAST_NOISE: f64 = 1e-3;
@@ -193,7 +193,7 @@ impl<'a> Read<'a> {
         let at = |centre: f64| Pole::new(centre, half_width).passes(values, mean);
         let [middle, white] = at(omega);
         let beside = WAY * omega.min(PI - omega) / half_width;
-        let beside = beside.clamp(BESIDE.0, BESIDE.1);
+        let beside = beside.min(BESIDE);
         let sides = [-beside, beside].map(|off| at(omega + off * half_width)[0]);
         let side = sides[0].min(sides[1]);
         let reaches = (1.0 + (0.5 * beside).powi(2)).recip();
@@ -210,12 +210,27 @@ impl<'a> Read<'a> {
     }
 }
 
-/// The oscillation of a centre and a half width, rad per sample, that all of these read: both quadratures of the best estimate of it, of
-/// which the oscillation itself has the standard deviation 1, and the part of its variance that is known.
-fn read_from(all: &[Read<'_>], omega: f64, half_width: f64) -> (Vec<[f64; 2]>, f64) {
+/// The best estimate of an oscillation of the standard deviation 1.
+struct Estimate {
+    /// Both quadratures at each sample.
+    turning: Vec<[f64; 2]>,
+    /// The part of its variance that is known.
+    known: f64,
+    /// How many times as wide as it is what is not known.
+    wider: f64,
+}
+
+/// The oscillation of a centre and a half width, rad per sample, that all of these read.
+fn read_from(all: &[Read<'_>], omega: f64, half_width: f64) -> Estimate {
     let height: f64 = all.iter().map(|r| r.height).sum();
-    let ratio = (1.0 + height).sqrt();
-    let pole = Pole::new(omega, half_width * ratio);
+    // In noise of density 1 an oscillation of a pole q has S = c / (1 + q^2 - 2 q cos). S / (S + 1), which is the filter and the density of
+    // what is not known, is of a pole p; the means of both are c / (1 - q^2) and (c p / q) / (1 - p^2).
+    let q = (-half_width).exp();
+    let c = height * (1.0 - q).powi(2);
+    let off = 0.5 * (c + (1.0 - q).powi(2)) / q;
+    let p = 1.0 + off - (off * (2.0 + off)).sqrt();
+    let unknown = p / q * (1.0 - q * q) / (1.0 - p * p);
+    let pole = Pole::new(omega, -p.ln());
     let back = Pole {
         pole: [pole.pole[0], -pole.pole[1]],
         ..pole
@@ -246,16 +261,19 @@ fn read_from(all: &[Read<'_>], omega: f64, half_width: f64) -> (Vec<[f64; 2]>, f
     }
     // What is known of a variance of 1 it has in this record, in either quadrature: what a wide filter has of the negative frequencies
     // adds to one and takes from the other.
-    let known = (ratio - 1.0) / ratio;
     let scale = [0, 1].map(|part| {
         let squares = turning.iter().map(|z| z[part] * z[part]);
         let found = squares.sum::<f64>() / turning.len().max(1) as f64;
-        (known / found.max(f64::MIN_POSITIVE)).sqrt()
+        ((1.0 - unknown) / found.max(f64::MIN_POSITIVE)).sqrt()
     });
     for z in &mut turning {
         *z = [scale[0] * z[0], scale[1] * z[1]];
     }
-    (turning, known)
+    Estimate {
+        turning,
+        known: 1.0 - unknown,
+        wider: -p.ln() / half_width,
+    }
 }
 
 /// The oscillation of a centre and a half width, rad per sample, that channels read, each with the phase by which the oscillation is
@@ -267,8 +285,8 @@ pub fn read(channels: &[(&[f64], f64)], omega: f64, half_width: f64) -> Option<V
     let all = all.filter_map(|(values, phase)| Read::new(values, *phase, omega, half_width));
     let all: Vec<Read<'_>> = all.collect();
     (!all.is_empty()).then(|| {
-        let (turning, _) = read_from(&all, omega, half_width);
-        turning.iter().map(|z| z[0]).collect()
+        let read = read_from(&all, omega, half_width);
+        read.turning.iter().map(|z| z[0]).collect()
     })
 }
 
@@ -362,11 +380,11 @@ impl Simulation {
             let height: f64 = read.iter().map(|r| r.height).sum();
             let parts = coherences.iter().zip(&read).map(|(c, r)| c * r.height);
             let coherence = parts.sum::<f64>() / height;
-            let (turning, known) = read_from(&read, omega, 0.5 * width);
-            let unread = coherence * (1.0 - known).sqrt();
+            let of = read_from(&read, omega, 0.5 * width);
+            let unread = coherence * (1.0 - of.known).sqrt();
             return Split {
-                unread: Some((unread, (1.0 - known).recip())),
-                ..Split::new(coherence, 0.0, &turning)
+                unread: Some((unread, of.wider)),
+                ..Split::new(coherence, 0.0, &of.turning)
             };
         }
         Split {
@@ -387,7 +405,13 @@ mod tests {
 
     #[test]
     fn an_oscillation_is_read_from_noise_as_well_as_its_height_lets_it() {
-        let (omega, half, n) = (1.1f64, 0.005f64, 200_000);
+        for (omega, half) in [(1.1, 0.005), (1.1, 0.05), (1.6, 0.1), (0.02, 0.0006)] {
+            is_read_as_well(omega, half);
+        }
+    }
+
+    fn is_read_as_well(omega: f64, half: f64) {
+        let n = 200_000;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let kept = (-half).exp();
@@ -415,7 +439,7 @@ mod tests {
                 .collect();
             let read = read.iter().enumerate();
             let all = read.map(|(k, v)| Read::new(v, k as f64, omega, half).unwrap());
-            let (found, known) = read_from(&all.collect::<Vec<_>>(), omega, half);
+            let Estimate { turning, known, .. } = read_from(&all.collect::<Vec<_>>(), omega, half);
             let product = |a: &[[f64; 2]], b: &[[f64; 2]]| -> f64 {
                 let each = a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]);
                 each.sum::<f64>() / n as f64
@@ -423,14 +447,20 @@ mod tests {
             // Of the best estimate m of z both E[m z*] and E|m|^2 are the known part of E|z|^2 = 2.
             let height: f64 = f64::from(channels) / (half * noise * noise);
             let expected = 1.0 - (1.0 + height).sqrt().recip();
-            assert!((known - expected).abs() < 0.03, "{known} {expected}");
-            for of in [product(&found, &true_z), product(&found, &found)] {
-                assert!((0.5 * of - expected).abs() < 0.05, "{of} {expected}");
+            assert!(
+                (known - expected).abs() < 0.03,
+                "{omega} {half}: {known} {expected}"
+            );
+            for of in [product(&turning, &true_z), product(&turning, &turning)] {
+                assert!(
+                    (0.5 * of - expected).abs() < 0.05,
+                    "{omega} {half}: {of} {expected}"
+                );
             }
         }
         let noise: Vec<f64> = (0..n).map(|_| normal()).collect();
         let read = Read::new(&noise, 0.0, omega, half);
-        let known = read.map_or(0.0, |r| read_from(&[r], omega, half).1);
+        let known = read.map_or(0.0, |r| read_from(&[r], omega, half).known);
         assert!(known < 0.2, "{known}");
     }
 }

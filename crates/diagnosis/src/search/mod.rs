@@ -198,10 +198,14 @@ impl<'a> Search<'a> {
                     continue;
                 }
             }
-            let siblings = hypotheses.len();
+            // What is weaker for a parameter more has the chance of all; what is without it keeps its own.
+            let whole = |h: &&Hypothesis| matches!(h, Hypothesis::Shaped(s) if s.whole());
+            let all = hypotheses.len();
+            let plain = all - hypotheses.iter().filter(whole).count();
             for mut hypothesis in hypotheses {
                 let of = channels_of(&hypothesis);
                 let common = !own(&of);
+                let siblings = if whole(&&hypothesis) { all } else { plain };
                 let columns = match &mut hypothesis {
                     // The panel has them now.
                     Hypothesis::Regression(r) => {
