@@ -8,6 +8,8 @@
 
 use std::collections::BTreeSet;
 
+use model::effect::Hypothesis;
+
 use crate::criticise::process::independence;
 use crate::features::lagged;
 use crate::fit::channel;
@@ -34,11 +36,15 @@ pub(crate) fn of_followers(search: &Search<'_>, state: &State) -> Vec<(&'static 
             continue;
         };
         let departures = lagged::departures(&search.view, signal);
-        // What the library has of the effect, and of one that extends it, is no departure.
+        // What the library has of the effect, and of one that extends it, is no departure; nor is a lag beside a lag.
+        let whole = |h: &Hypothesis| matches!(h, Hypothesis::Shaped(s) if s.whole());
+        let mut own = state.terms.iter().filter(|t| t.effect.id() == effect);
+        let lags = own.any(|t| matches!(&t.form, Form::Shaped(s, _) if s.whole()));
         let of_it = search
             .candidates
             .iter()
-            .filter(|c| c.effect.id() == effect || c.effect.extends() == Some(effect));
+            .filter(|c| c.effect.id() == effect || c.effect.extends() == Some(effect))
+            .filter(|c| lags || !whole(&c.hypothesis));
         let own = state.columns();
         // What its terms explain together: of several that share it, each alone has little.
         let without = state.terms.iter().filter(|t| t.effect.id() != effect);
