@@ -132,19 +132,31 @@ fn offer(
     }
 }
 
-/// Nats by which one law of an effect's variance has to be ahead of its others; within them the record does not tell which it
-/// is, and the effect's own is the first.
+/// Nats by which one law of an effect's variance has to be ahead of its others, of which they then have a twentieth of its
+/// likelihood; within them the record does not tell which it is, and the effect's own is the first.
 const OPEN: f64 = 3.0;
 
-/// Of the laws of each effect that was found, the one that the residual `e` tells beside the others.
-pub(crate) fn settle(s: &Searched<'_>, laws: &mut VarianceLaws, e: &[f64]) {
-    for i in 0..laws.each.len() {
-        let e = beside(e, &laws.each, Some(i));
-        settle_one(s, &mut laws.each[i], &e);
-    }
+/// A law of the variance that the record does not tell from the one that was taken.
+pub(crate) struct Untold {
+    /// Of which of the laws that were found.
+    pub of: usize,
+    /// What it adds, by sample, in units of its coefficient.
+    pub shape: Vec<f64>,
 }
 
-fn settle_one(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
+/// Of the laws of each effect that was found, the one that the residual `e` tells beside the others, and those that it does not
+/// tell from it.
+pub(crate) fn settle(s: &Searched<'_>, laws: &mut VarianceLaws, e: &[f64]) -> Vec<Untold> {
+    let mut untold = vec![];
+    for of in 0..laws.each.len() {
+        let e = beside(e, &laws.each, Some(of));
+        let others = settle_one(s, &mut laws.each[of], &e).into_iter();
+        untold.extend(others.map(|shape| Untold { of, shape }));
+    }
+    untold
+}
+
+fn settle_one(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) -> Vec<Vec<f64>> {
     let own = s.search.candidates.iter();
     let own = own.filter(|c| c.effect.id() == v.effect.id());
     let laws: Vec<_> = own
@@ -156,19 +168,21 @@ fn settle_one(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) {
         })
         .collect();
     let best = laws.iter().map(|((lr, ..), ..)| *lr).fold(0.0, f64::max);
-    let near: Vec<_> = laws
-        .iter()
-        .filter(|((lr, ..), ..)| best - lr < 2.0 * OPEN)
+    let near: Vec<usize> = (0..laws.len())
+        .filter(|i| best - laws[*i].0.0 < 2.0 * OPEN)
         .collect();
-    let ((_, increase, error), fixed, shape) = match (near.as_slice(), laws.first()) {
-        ([(told, fixed, shape)], _) => (*told, (*fixed).clone(), *shape),
-        (_, Some((first, _, shape))) => (*first, vec![], *shape),
-        _ => return,
+    let (taken, fixed) = match near[..] {
+        [] => return vec![],
+        [told] => (told, laws[told].1.clone()),
+        _ => (0, vec![]),
     };
-    v.found.coefficients = vec![(increase, error)];
+    let ((_, increase, error), _, shape) = &laws[taken];
+    v.found.coefficients = vec![(*increase, *error)];
     v.found.fixed = fixed;
     v.shape.clone_from(shape);
     v.parameters = v.effect.describe(&v.found);
+    let others = near.into_iter().filter(|i| *i != taken);
+    others.map(|i| laws[i].2.clone()).collect()
 }
 
 /// What the laws of the variance that were found on a channel claim, each claim with its chance.

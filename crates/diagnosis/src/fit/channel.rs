@@ -1,15 +1,18 @@
 //! The model of a channel: its terms, their form, the noise and the fit.
 
 mod path;
+mod variance;
 
 use std::sync::Arc;
 
-use model::effect::{Effect, Found, Frequencies, Parameters, Peak, Shape, extremes};
+use model::effect::{Effect, Found, Frequencies, Peak, Shape};
 
+use crate::fit::before_filter::HALF_WIDTH;
 use crate::fit::likelihood::{Noise, Panel, Solution};
-use crate::fit::scan::{LOUD, residual};
+use crate::fit::scan::residual;
 use crate::test_level::{Outcome, Worded};
 pub use path::Path;
+pub(crate) use variance::{VarianceFound, VarianceLaws, divide, over_mean, undo};
 
 /// Id of the stand-in that the search knows them by; no cause of the library.
 pub const ID: &str = "beyond";
@@ -304,99 +307,6 @@ pub struct PowerLawFound {
     pub filter: bool,
 }
 
-/// A law of the variance that was found.
-pub(crate) struct VarianceFound {
-    pub effect: &'static dyn Effect,
-    pub parameters: Parameters,
-    /// What was estimated.
-    pub found: Found,
-    /// What it adds, by sample, in units of the coefficient: the law is 1 + coefficient x shape.
-    pub shape: Vec<f64>,
-    pub lr: f64,
-    pub threshold: f64,
-    pub alternatives: Vec<(&'static dyn Effect, f64)>,
-    /// Variance over its mean, by sample.
-    pub law: Vec<f64>,
-    /// The channel that it follows.
-    pub follows: Option<String>,
-}
-
-impl VarianceFound {
-    /// Coefficient of the law.
-    pub fn gamma(&self) -> f64 {
-        self.found.coefficients.first().map_or(0.0, |c| c.0)
-    }
-}
-
-/// Laws of the variance of a channel, which multiply.
-#[derive(Default)]
-pub(crate) struct VarianceLaws {
-    /// Each law.
-    pub each: Vec<VarianceFound>,
-    /// Variance under all of them over its mean, by sample; of no law empty.
-    product: Vec<f64>,
-}
-
-impl VarianceLaws {
-    /// These laws together.
-    pub fn of(each: Vec<VarianceFound>) -> Self {
-        let count = each.first().map_or(0, |v| v.law.len());
-        let at = |i: usize| each.iter().map(|v| v.law[i]).product::<f64>();
-        let mut product: Vec<f64> = (0..count).map(at).collect();
-        over_mean(&mut product);
-        Self { each, product }
-    }
-
-    /// Variance over its mean by sample, where it is not the same throughout.
-    pub fn product(&self) -> Option<&[f64]> {
-        (!self.is_empty()).then_some(self.product.as_slice())
-    }
-
-    /// Likelihood ratio of all of them.
-    pub fn lr(&self) -> f64 {
-        self.each.iter().map(|v| v.lr).sum()
-    }
-
-    /// Whether the variance is the same throughout.
-    pub fn is_empty(&self) -> bool {
-        self.each.is_empty()
-    }
-
-    /// Whether it is many times as large in some places as in others.
-    pub fn are_loud(&self) -> bool {
-        let [least, most] = extremes(&self.product);
-        most > LOUD * least
-    }
-
-    /// A residual over the square root of the variance.
-    pub fn divide(&self, e: &mut [f64]) {
-        divide(e, &self.product);
-    }
-
-    /// The same undone.
-    pub fn undo(&self, e: &mut [f64]) {
-        undo(e, &self.product);
-    }
-}
-
-/// A residual over the square root of a variance by sample; of no variance as it is.
-pub(crate) fn divide(e: &mut [f64], variance: &[f64]) {
-    let both = e.iter_mut().zip(variance);
-    both.for_each(|(e, v)| *e /= v.sqrt());
-}
-
-/// The same undone.
-pub(crate) fn undo(e: &mut [f64], variance: &[f64]) {
-    let both = e.iter_mut().zip(variance);
-    both.for_each(|(e, v)| *e *= v.sqrt());
-}
-
-/// Values over their mean.
-pub(crate) fn over_mean(values: &mut [f64]) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|v| *v /= mean);
-}
-
 /// What the noise of a channel is, at the law's zero where it follows one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Levels {
@@ -421,6 +331,21 @@ pub(crate) struct Joint {
     pub found: Vec<Found>,
     /// Innovations over their standard deviation, NaN where nothing was read.
     pub innovations: Vec<f64>,
+}
+
+impl Joint {
+    /// Lets the intervals of the laws and of the white noise reach as far as those of another law that the record does not tell
+    /// from this one: which of the two it is makes most of the error.
+    pub fn reach(&mut self, other: &Self) {
+        let wider = |(own, error): (f64, f64), (value, others): (f64, f64)| {
+            error.max(others + (value - own).abs() / HALF_WIDTH)
+        };
+        for (own, other) in self.laws.iter_mut().zip(&other.laws) {
+            own.1 = wider(*own, *other);
+        }
+        let white = |levels: &Levels| (levels.white.ln(), levels.white_error);
+        self.levels.white_error = wider(white(&self.levels), white(&other.levels));
+    }
 }
 
 /// Whitened coefficients, and the same in time: independent N(0, 1) under the model. A level that is known sample by

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use model::effect::View;
 
+use crate::criticise::variance_law::Untold;
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
 use crate::fit::channel::{State, VarianceLaws, whitened};
 use crate::fit::estimate;
@@ -168,8 +169,16 @@ fn estimate_under_law(s: &mut Searched<'_>, grid: &Grid) {
     if laws.is_empty() {
         return;
     }
-    variance_law::settle(s, &mut laws, &s.e);
+    let untold = variance_law::settle(s, &mut laws, &s.e);
     s.joint = joint::estimate(s, &laws.each, grid.bursts.as_ref());
+    for Untold { of, mut shape } in untold {
+        std::mem::swap(&mut laws.each[of].shape, &mut shape);
+        let other = joint::estimate(s, &laws.each, grid.bursts.as_ref());
+        std::mem::swap(&mut laws.each[of].shape, &mut shape);
+        if let (Some(joint), Some(other)) = (&mut s.joint, other) {
+            joint.reach(&other);
+        }
+    }
     if let Some(joint) = &s.joint {
         s.found.clone_from(&joint.found);
         for (v, told) in laws.each.iter_mut().zip(&joint.laws) {
