@@ -6,6 +6,7 @@
 //! | `channel` | `at` in the unit of the channel followed, `level` | the same over what that channel reads |
 //! | `spectrum` | `center` Hz, `width` Hz, `size` | a noise for each: a Lorentzian of that full width at half power |
 //! | the same with `refines` | | a tone of steady size that visits each bump for its share of the time |
+//! | `lag` | `lag` s, `size`, `weight` 1 | white noise and `weight` times the same that much later, of that size together |
 //! | `variance` | `time` s or `at`, `factor` | white variance times a factor, whose logarithm goes straight from knot to knot |
 //! | `cross` | `correlation` | white noise that two axes share |
 //! | `codes` | `skewness`, `excess_kurtosis` | the shape of the distribution of the white noise |
@@ -30,6 +31,8 @@ pub enum Domain {
     Channel,
     /// The spectrum of the noise.
     Spectrum,
+    /// Noise that comes again.
+    Lag,
     /// The variance of the white noise over time or over a recorded channel.
     Variance,
     /// What two axes share.
@@ -63,10 +66,11 @@ const fn column(name: &'static str, unit: Option<&'static str>, range: Range) ->
 
 impl Domain {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Mean,
         Self::Channel,
         Self::Spectrum,
+        Self::Lag,
         Self::Variance,
         Self::Cross,
         Self::Codes,
@@ -79,6 +83,7 @@ impl Domain {
             Self::Mean => "mean",
             Self::Channel => "channel",
             Self::Spectrum => "spectrum",
+            Self::Lag => "lag",
             Self::Variance => "variance",
             Self::Cross => "cross",
             Self::Codes => "codes",
@@ -97,6 +102,11 @@ impl Domain {
             column("width", Some("Hz"), range::POSITIVE),
             column("size", Some("deg/s"), range::SIZE),
         ];
+        const LAG: &[ColumnSpec] = &[
+            column("lag", Some("s"), range::POSITIVE),
+            column("size", Some("deg/s"), range::SIZE),
+            column("weight", Some("1"), range::CORRELATION),
+        ];
         const CODES: &[ColumnSpec] = &[
             column("skewness", Some("1"), range::SKEWNESS),
             column("excess_kurtosis", Some("1"), range::EXCESS_KURTOSIS),
@@ -110,6 +120,7 @@ impl Domain {
             (Self::Mean, _) => MEAN,
             (Self::Channel, _) => CHANNEL,
             (Self::Spectrum, _) => SPECTRUM,
+            (Self::Lag, _) => LAG,
             (Self::Variance, false) => OVER_TIME,
             (Self::Variance, true) => OVER_CHANNEL,
             (Self::Cross, _) => CROSS,

@@ -72,7 +72,7 @@ pub(crate) fn nearest_of(channel: &str, all: &[Finding]) -> Observation {
 fn fallen(s: &Searched<'_>, doubts: &[Doubt]) -> Vec<usize> {
     let all = || s.state.terms.iter().zip(doubts);
     let falls = |(term, doubt): &(&Term, &Doubt)| {
-        !term.is_part() && (**doubt != Doubt::No || term.effect.id() == channel::ID)
+        !term.is_part() && (**doubt != Doubt::No || term.has_no_name())
     };
     let bands: Vec<f64> = (all().filter(falls))
         .filter_map(|(term, _)| term.cluster.map(|c| c.lr))
@@ -83,6 +83,19 @@ fn fallen(s: &Searched<'_>, doubts: &[Doubt]) -> Vec<usize> {
         .filter(|(_, pair)| falls(pair) || of_band(pair.0))
         .map(|(place, _)| place)
         .collect()
+}
+
+/// What a term without a name is.
+fn nameless(s: &Searched<'_>, term: &Term) -> String {
+    if let Some((lag, correlation)) = term.lag() {
+        let seconds = lag as f64 / s.search.view.rate_hz;
+        return format!(
+            "noise that comes again after {lag} samples, {seconds:.3} s: readings so far apart correlate by {correlation:.3}"
+        );
+    }
+    let of = term.follows.as_deref().unwrap_or_default();
+    let lr = term.lr;
+    format!("follows the {of}, which no effect of the library does (likelihood ratio {lr:.0})")
 }
 
 /// Take the doubted names of a channel out of its findings, given as one for each term and one for each law of the variance that
@@ -104,13 +117,8 @@ pub(crate) fn withdraw(
         if term.is_part() {
             continue;
         }
-        if term.effect.id() == channel::ID {
-            let of = term.follows.as_deref().unwrap_or_default();
-            let what = format!(
-                "follows the {of}, which no effect of the library does (likelihood ratio {:.0})",
-                term.lr
-            );
-            let seen = Observation::of_noise(name, what);
+        if term.has_no_name() {
+            let seen = Observation::of_noise(name, nameless(s, term));
             unexplained.push(term.of.iter().fold(seen, |seen, of| seen.following(of)));
         } else {
             match doubt {

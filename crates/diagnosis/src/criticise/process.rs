@@ -93,8 +93,8 @@ pub(crate) fn of_processes(
     };
     let white = beside_white(&Term::is_filter);
     for term in &covariances {
-        // A part of a band is asked with it.
-        if term.is_part() {
+        // A part of a band is asked with it, and what has no name claims nothing.
+        if term.is_part() || term.has_no_name() {
             continue;
         }
         // Bands that overlap are one.
@@ -151,7 +151,7 @@ fn claims(term: &Term) -> [Option<CheckId>; 4] {
 /// its variance.
 pub(crate) fn stationary(s: &Searched<'_>, rhythm: &Outcome) -> Option<Outcome> {
     let is_one = |t: &Term| {
-        if t.is_band() {
+        if t.is_band() || t.has_no_name() {
             return false;
         }
         let hypothesis = &s.search.candidates[t.candidate].hypothesis;

@@ -62,24 +62,6 @@ pub(crate) fn ljung_box(e: &[f64]) -> Outcome {
     }
 }
 
-/// Part of the correlation that lies at one lag, from which on it is an echo.
-const ECHO: f64 = 0.8;
-
-/// The lag that holds the correlation of a residual, where one does: noise that comes again.
-pub(crate) fn echo(e: &[f64]) -> Option<usize> {
-    let n = e.len() as f64;
-    let total = dot(e, e);
-    let squares = (1..=LAGS).map(|lag| {
-        let r = dot(&e[..e.len().saturating_sub(lag)], &e[lag..]) / total;
-        (lag, n * r * r)
-    });
-    let squares: Vec<(usize, f64)> = squares.collect();
-    let (lag, most) = squares.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    // Every other lag has 1 by chance.
-    let beyond = squares.iter().map(|s| s.1).sum::<f64>() - (LAGS as f64 - 1.0);
-    (lag > 1 && most > ECHO * beyond).then_some(lag)
-}
-
 /// A band of the whitened coefficients: its first one and its end, energy over the model's, chance times the bands.
 pub(crate) struct Band {
     pub from: usize,

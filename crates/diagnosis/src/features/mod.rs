@@ -13,6 +13,7 @@ use model::simulate::Simulation;
 
 use crate::fit::channel::{ID, Term};
 
+pub(crate) mod echo;
 pub(crate) mod lagged;
 
 /// The stand-in.

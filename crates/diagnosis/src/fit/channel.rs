@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use model::effect::{Effect, Found, Frequencies, Peak, Shape};
 
-use crate::fit::before_filter::HALF_WIDTH;
 use crate::fit::likelihood::{Noise, Panel, Solution};
 use crate::fit::scan::residual;
 use crate::test_level::{Outcome, Worded};
+use numerics::tails::TWO_SIDED;
 pub use path::Path;
 pub(crate) use variance::{VarianceFound, VarianceLaws, divide, over_mean, undo};
 
@@ -129,9 +129,9 @@ impl Term {
         self.lr - self.threshold
     }
 
-    /// Whether it is a process that is added and stands at no one frequency.
+    /// Whether it is a process that is added and stands at no one frequency and at no one lag.
     pub(crate) fn is_process(&self) -> bool {
-        matches!(&self.form, Form::Covariance(c, _) if !c.filters_white() && !c.is_peak())
+        matches!(&self.form, Form::Covariance(c, theta) if !c.filters_white() && !c.is_peak() && c.lag(theta).is_none())
     }
 
     /// Whether it is a process that wanders: one whose density falls with the frequency. Rounded angles make one that rises, in
@@ -181,6 +181,19 @@ impl Term {
     /// Whether the noise that it is, if it is one, is Gaussian.
     pub(crate) fn is_normal(&self) -> bool {
         !matches!(&self.form, Form::Covariance(c, _) if !c.is_normal())
+    }
+
+    /// The lag at which it makes readings correlate, samples, and by how much, where it is noise that comes again.
+    pub(crate) fn lag(&self) -> Option<(usize, f64)> {
+        match &self.form {
+            Form::Covariance(c, theta) => c.lag(theta),
+            _ => None,
+        }
+    }
+
+    /// Whether it is what follows recorded channels as no effect of the library does.
+    pub(crate) fn is_combination(&self) -> bool {
+        self.has_no_name() && !self.is_covariance()
     }
 
     pub(crate) fn has_no_name(&self) -> bool {
@@ -338,7 +351,7 @@ impl Joint {
     /// from this one: which of the two it is makes most of the error.
     pub fn reach(&mut self, other: &Self) {
         let wider = |(own, error): (f64, f64), (value, others): (f64, f64)| {
-            error.max(others + (value - own).abs() / HALF_WIDTH)
+            error.max(others + (value - own).abs() / TWO_SIDED)
         };
         for (own, other) in self.laws.iter_mut().zip(&other.laws) {
             own.1 = wider(*own, *other);

@@ -71,6 +71,12 @@ pub fn covariance(dimensions: usize) -> f64 {
     quantile(dimensions, 1.0)
 }
 
+/// A stationary term with one size, of either sign, at any of `lags` lags.
+#[must_use]
+pub fn at_lag(lags: usize) -> f64 {
+    quantile(1, lags as f64)
+}
+
 /// Part of the false alarms of a hypothesis that one has which is asked once in a thousand channels.
 pub(crate) const SELDOM: f64 = 0.1;
 

@@ -7,6 +7,7 @@ mod band_alone;
 pub(crate) mod band_source;
 pub(crate) mod bands;
 mod beyond;
+mod candidates;
 mod combs;
 pub(crate) mod envelope;
 mod harmonic;
@@ -24,58 +25,18 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use model::effect::{Effect, Hypothesis, VarianceLaw, View};
-use model::effects::EFFECTS;
-use model::record::Quantity;
+use model::effect::{Hypothesis, View};
 
-use crate::features;
 use crate::fit::channel::{Form, RIVAL_SPAN, State, Term};
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::fit::{channel, threshold};
-use crate::test_level::{CLAIM_LEVEL, worded};
+use crate::test_level::CLAIM_LEVEL;
+pub use candidates::Candidate;
 
 /// Most terms on one channel.
 const MOST_TERMS: usize = 8;
 /// Most lines, and most steps, that are told as separate causes.
 pub const MOST_ALIKE: usize = 2;
-/// A hypothesis under test.
-pub struct Candidate {
-    /// Its effect.
-    pub effect: &'static dyn Effect,
-    /// The hypothesis.
-    pub hypothesis: Hypothesis,
-    /// Names of the recorded channels that a regression follows.
-    of: Vec<String>,
-    columns: Vec<usize>,
-    grid: Vec<(f64, Vec<usize>)>,
-    siblings: usize,
-    /// What it has to reach beyond its threshold.
-    handicap: f64,
-}
-
-impl Candidate {
-    /// Columns of the panel that a regression uses.
-    #[must_use]
-    pub fn columns(&self) -> &[usize] {
-        &self.columns
-    }
-
-    /// A shape's coordinates that are tried first, with the columns there.
-    pub(crate) fn grid(&self) -> &[(f64, Vec<usize>)] {
-        &self.grid
-    }
-
-    /// How many hypotheses its effect offers.
-    pub(crate) fn siblings(&self) -> usize {
-        self.siblings
-    }
-
-    /// The same, and those of a shape at every point of its grid.
-    pub(crate) fn all_columns(&self) -> impl Iterator<Item = usize> {
-        let grid = self.grid.iter().flat_map(|(_, columns)| columns);
-        self.columns.iter().chain(grid).copied()
-    }
-}
 
 /// Likelihood ratio of the best peak that the search would offer to white noise: what its threshold is calibrated by.
 #[must_use]
@@ -130,132 +91,11 @@ pub struct Search<'a> {
 /// What a state without processes is known by: the data's revision, its random walk, its terms with their columns.
 type Place = (usize, u64, Vec<(usize, Vec<usize>)>);
 
-/// Names of the recorded channels that a hypothesis of the library follows: it lists them.
-fn channels_of(hypothesis: &Hypothesis) -> Vec<String> {
-    let follows = match hypothesis {
-        Hypothesis::Regression(r) => r.follows.as_deref(),
-        Hypothesis::Shaped(s) => s.follows(),
-        _ => None,
-    };
-    let names = follows.into_iter().flat_map(|f| f.split(", "));
-    names.map(str::to_owned).collect()
-}
-
-/// Why a course of time is not sought in bursts.
-const IN_BURSTS: &str =
-    "the record comes in bursts, and says nothing of the time between: record in one piece";
-
-/// Whether bursts laid end to end tell of it: what follows a recorded channel, what is faster than a burst, and what axes
-/// or counts have. Courses of time and tones break off at every burst, and a slow process has no time of its own.
-fn told_by_bursts(hypothesis: &Hypothesis, samples: usize) -> bool {
-    match hypothesis {
-        Hypothesis::Regression(r) => r.follows.is_some(),
-        Hypothesis::Covariance(c) => {
-            let start = c.starts(samples).into_iter().next();
-            !c.is_peak() && start.is_some_and(|s| c.poles(&s, samples).is_none())
-        }
-        Hypothesis::Variance(law) => matches!(law, VarianceLaw::Shape { .. }),
-        Hypothesis::Shaped(_)
-        | Hypothesis::Step
-        | Hypothesis::Line
-        | Hypothesis::SideBands
-        | Hypothesis::TwoLevel
-        | Hypothesis::WanderingTone
-        | Hypothesis::Motion
-        | Hypothesis::Blow => false,
-        Hypothesis::Common | Hypothesis::Correlation | Hypothesis::Scale | Hypothesis::Audit => {
-            true
-        }
-    }
-}
-
 impl<'a> Search<'a> {
     /// Lay out all hypotheses for a channel; of one in `bursts` that are laid end to end those that such a record can tell of.
     #[must_use]
     pub fn new(panel: Panel, view: View<'a>, bursts: bool) -> Self {
-        let mut candidates = vec![];
-        let mut not_tested = vec![];
-        // What follows a thermometer of this axis is no column of another one.
-        let own = |of: &[String]| {
-            let mut thermometers = view
-                .signals
-                .iter()
-                .filter(|s| s.quantity == Quantity::Temp && s.axis.is_some());
-            thermometers.any(|s| of.contains(&s.name))
-        };
-        for effect in EFFECTS {
-            let mut hypotheses = match effect.hypotheses(&view) {
-                Err(why) => {
-                    not_tested.push((effect.id(), why));
-                    continue;
-                }
-                Ok(hypotheses) => hypotheses,
-            };
-            if bursts {
-                hypotheses.retain(|h| told_by_bursts(h, view.samples));
-                if hypotheses.is_empty() {
-                    not_tested.push((effect.id(), IN_BURSTS.to_owned()));
-                    continue;
-                }
-            }
-            // What is weaker for a parameter more has the chance of all; what is without it keeps its own.
-            let whole = |h: &&Hypothesis| matches!(h, Hypothesis::Shaped(s) if s.whole());
-            let all = hypotheses.len();
-            let plain = all - hypotheses.iter().filter(whole).count();
-            for mut hypothesis in hypotheses {
-                let of = channels_of(&hypothesis);
-                let common = !own(&of);
-                let siblings = if whole(&&hypothesis) { all } else { plain };
-                let columns = match &mut hypothesis {
-                    // The panel has them now.
-                    Hypothesis::Regression(r) => {
-                        let columns = r.columns.iter_mut();
-                        let values = columns.map(|c| std::mem::take(&mut c.values));
-                        panel.add_candidate(&values.collect::<Vec<_>>(), common)
-                    }
-                    _ => vec![],
-                };
-                let grid = match &hypothesis {
-                    Hypothesis::Shaped(s) => s
-                        .grid()
-                        .into_iter()
-                        .map(|at| {
-                            let columns = s.columns(at).into_iter().map(|c| c.values);
-                            let columns: Vec<Vec<f64>> = columns.collect();
-                            (at, panel.add_candidate(&columns, common))
-                        })
-                        .collect(),
-                    _ => vec![],
-                };
-                candidates.push(Candidate {
-                    effect: *effect,
-                    hypothesis,
-                    of,
-                    columns,
-                    grid,
-                    siblings,
-                    handicap: 0.0,
-                });
-            }
-        }
-        let unknown = features::combinations(&view);
-        let siblings = unknown.len();
-        for mut combination in unknown {
-            combination.what = worded(combination.what);
-            let of = combination.channels.clone();
-            let common = !own(&of);
-            let columns = panel.add_named(&combination.what, common, &combination.columns);
-            candidates.push(Candidate {
-                effect: &features::EFFECT,
-                hypothesis: combination.hypothesis(columns.len()),
-                of,
-                columns,
-                grid: vec![],
-                siblings,
-                // A cause of the library that does as well goes before a combination that has no name.
-                handicap: RIVAL_SPAN,
-            });
-        }
+        let (candidates, not_tested) = candidates::all(&panel, &view, bursts);
         Self {
             panel,
             view,

@@ -50,7 +50,7 @@ impl Covariance for PowerLaw {
 pub(crate) fn instead(search: &Search<'_>, state: &State) -> Option<PowerLawFound> {
     let processes = || {
         state.terms.iter().filter_map(|t| match &t.form {
-            Form::Covariance(c, _) if !c.is_peak() => Some((t, c)),
+            Form::Covariance(c, theta) if !c.is_peak() && c.lag(theta).is_none() => Some((t, c)),
             _ => None,
         })
     };
@@ -73,8 +73,9 @@ pub(crate) fn instead(search: &Search<'_>, state: &State) -> Option<PowerLawFoun
     let fitted = |filter: bool, exponents: (f64, f64)| {
         let law: Arc<dyn Covariance> = Arc::new(PowerLaw { exponents });
         let mut kept = state.noise.clone();
-        kept.terms
-            .retain(|(c, _)| c.is_peak() || !filter && c.filters_white());
+        kept.terms.retain(|(c, theta)| {
+            c.is_peak() || c.lag(theta).is_some() || !filter && c.filters_white()
+        });
         let fits = law.starts(n).into_iter().map(|theta| {
             let mut noise = kept.clone();
             noise.terms.push((Arc::clone(&law), theta));

@@ -24,7 +24,7 @@ impl Search<'_> {
     fn processes(&self) -> Vec<Process<'_>> {
         let all = self.candidates.iter().enumerate();
         all.filter_map(|(i, c)| match &c.hypothesis {
-            Hypothesis::Covariance(p) if !p.is_peak() => Some((i, p)),
+            Hypothesis::Covariance(p) if !p.is_peak() && !c.is_nameless() => Some((i, p)),
             _ => None,
         })
         .collect()
@@ -38,7 +38,7 @@ impl Search<'_> {
 
     /// The state with the pair of processes that explains most, where that is better than those that were found.
     pub(super) fn pair_up(&self, state: State) -> State {
-        let paired = |t: &Term| t.is_covariance() && !t.is_band();
+        let paired = |t: &Term| t.is_covariance() && !t.is_band() && !t.has_no_name();
         if !state.terms.iter().any(paired) {
             return state;
         }

@@ -90,6 +90,7 @@ impl Search<'_> {
                 let n = self.panel.bins.n;
                 self.weigh_peak(state, i, c, threshold::peak(n) / bands::AHEAD)
             }
+            Hypothesis::Covariance(c) if c.at_lag(1, 0.0).is_some() => self.weigh_at_lag(&of, c),
             Hypothesis::Covariance(c) => self.weigh_covariance(&of, c),
             _ => None,
         }
@@ -272,7 +273,10 @@ impl Search<'_> {
         let limit = threshold::covariance(c.dimensions());
         let grid = c.grid();
         let reason = match grid.is_empty() {
-            false => self.correlations(of.state, FAR).fold(0.0, f64::max),
+            false => {
+                let all = self.correlations(of.state, FAR);
+                all.map(|r| n as f64 * r * r).fold(0.0, f64::max)
+            }
             true if c.dimensions() > scoring::FEW => self.neighbours(of.state, c.dimensions()),
             true => limit,
         };
@@ -307,12 +311,32 @@ impl Search<'_> {
         ))
     }
 
-    /// What the correlations of a state's residual at the first `lags` lags say against white noise, chi-square of as many degrees.
-    pub(super) fn neighbours(&self, state: &State, lags: usize) -> f64 {
-        self.correlations(state, lags).sum()
+    /// What a stationary term that stands at a lag offers at the one where the readings correlate most. Neighbours are those of
+    /// the library's.
+    fn weigh_at_lag(&self, of: &Weighed<'_>, c: &Arc<dyn Covariance>) -> Option<Term> {
+        let n = self.panel.bins.n;
+        let limit = threshold::at_lag(FAR - 1) + of.candidate.handicap;
+        let all = self.correlations(of.state, FAR).zip(1..).skip(1);
+        let (at, lag) = all.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+        if n as f64 * at * at < limit {
+            return None;
+        }
+        let (located, theta) = c.at_lag(lag, at)?;
+        let mut noise = of.state.noise.clone();
+        noise.terms.push((Arc::clone(&located), theta));
+        let (noise, solution) = self.panel.fit(&noise, &of.own);
+        let theta = noise.terms.last()?.1.clone();
+        let lr = self.of_read() * 2.0 * (solution.log_likelihood - of.null);
+        Some(of.term(Form::Covariance(located, theta), vec![], vec![], lr, limit))
     }
 
-    /// The same at each lag.
+    /// What the correlations of a state's residual at the first `lags` lags say against white noise, chi-square of as many degrees.
+    pub(super) fn neighbours(&self, state: &State, lags: usize) -> f64 {
+        let n = self.panel.bins.n as f64;
+        self.correlations(state, lags).map(|r| n * r * r).sum()
+    }
+
+    /// The correlation at each lag.
     fn correlations(&self, state: &State, lags: usize) -> impl Iterator<Item = f64> {
         let bins = &self.panel.bins;
         let energy = self
@@ -334,7 +358,7 @@ impl Search<'_> {
             }
             at
         };
-        (0..lags).map(move |_| n * next().powi(2))
+        (0..lags).map(move |_| next())
     }
 
     /// Fastest slow swing of a line, half cycles in the record.
@@ -376,6 +400,8 @@ impl Search<'_> {
                     && !self.view.sways()
                     && if of.is_peak() {
                         Self::open_to_bands(state)
+                    } else if c.is_nameless() {
+                        state.terms.iter().all(|t| t.candidate != i)
                     } else {
                         state.terms.iter().all(|t| t.effect.id() != c.effect.id())
                     }

@@ -161,6 +161,7 @@ pub(crate) fn fit(
         if alone {
             all.terms.extend(of_white(s, &white, grid.rate_hz));
             all.terms.extend(of_combinations(s, grid));
+            all.terms.extend(of_lag(s, grid.rate_hz));
             all.terms.extend(of_signals(s, &white, grid, causes));
         }
         whites.push((s, white));
@@ -258,6 +259,20 @@ fn of_spectrum(s: &Searched<'_>, found: &Spectrum, rate_hz: f64) -> Vec<Unnamed>
     let tones = found.tones.iter().map(|(id, bumps)| of(bumps, Some(id)));
     let noise = (!found.bumps.is_empty()).then(|| of(&found.bumps, None));
     tones.chain(noise).collect()
+}
+
+/// Noise that comes again.
+fn of_lag(s: &Searched<'_>, rate_hz: f64) -> Option<Unnamed> {
+    let (lag, correlation) = s.state.terms.iter().find_map(Term::lag)?;
+    // Of white noise of variance 1 and one p that comes again after the lag, +-p / (2 (1 + p)).
+    let r = correlation.abs();
+    let size = (s.state.solution.white * 2.0 * r / (1.0 - 2.0 * r)).sqrt();
+    let columns = vec![
+        Column::new(vec![lag as f64 / rate_hz], "s"),
+        Column::new(vec![size], &s.target.unit),
+        Column::new(vec![correlation.signum()], "1"),
+    ];
+    Some(term(s, Domain::Lag, size, columns))
 }
 
 /// What follows the channels that were recorded beside the gyros, straight, but for those that a source shakes together with the axis.

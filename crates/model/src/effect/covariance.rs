@@ -96,6 +96,15 @@ pub trait Covariance: Send + Sync {
     fn about(&self, _peak: &Peak) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {
         None
     }
+    /// The same term at one lag, samples, and where it starts from where readings correlate by so much there: of a term that stands
+    /// at a lag, which has to be sought in the data.
+    fn at_lag(&self, _lag: usize, _correlation: f64) -> Option<(Arc<dyn Covariance>, Vec<f64>)> {
+        None
+    }
+    /// The lag at which such a term stands, samples, and the correlation that it makes there of white noise.
+    fn lag(&self, _theta: &[f64]) -> Option<(usize, f64)> {
+        None
+    }
     /// Other shapes of such a term at the same place, with the same coordinates.
     fn variants(&self) -> Vec<Arc<dyn Covariance>> {
         vec![]

@@ -33,6 +33,13 @@ pub(super) enum Random {
         size: f64,
         places: Vec<[f64; 3]>,
     },
+    /// White noise and `weight` times the same `lag` samples later: axis, standard deviation of both together, deg/s.
+    Echo {
+        axis: usize,
+        size: f64,
+        lag: usize,
+        weight: f64,
+    },
     /// White noise that two axes share, and the correlation that it makes.
     Shared { axes: [usize; 2], correlation: f64 },
 }
@@ -51,6 +58,12 @@ impl Random {
                 width,
             } => run.add_mode(*axis, *size, *center, *width, |_| {}),
             Self::Tone { axis, size, places } => run.add_tone(*axis, *size, places),
+            Self::Echo {
+                axis,
+                size,
+                lag,
+                weight,
+            } => run.add_echo(*axis, *size, *lag, *weight),
             Self::Shared { axes, correlation } => {
                 correlated_noise::share(run, *axes, *correlation);
             }
@@ -89,6 +102,7 @@ impl Generic {
                 })?,
                 Domain::Spectrum if term.refines.is_some() => all.tones(term, &axes),
                 Domain::Spectrum => all.modes(term, &axes),
+                Domain::Lag => all.echoes(term, &axes, run.rate_hz),
                 Domain::Cross => {
                     if let ([a, b], [r, ..]) = (&*axes, term.values(0)) {
                         all.random.push(Random::Shared {
@@ -118,6 +132,18 @@ impl Generic {
             size: in_all.sqrt(),
             places: places.clone(),
         }));
+    }
+
+    fn echoes(&mut self, term: &Unnamed, axes: &[usize], rate_hz: f64) {
+        let columns = term.values(0).iter().zip(term.values(1));
+        for ((lag, size), weight) in columns.zip(term.values(2)) {
+            self.random.extend(axes.iter().map(|axis| Random::Echo {
+                axis: *axis,
+                size: *size,
+                lag: (lag * rate_hz).round().max(1.0) as usize,
+                weight: *weight,
+            }));
+        }
     }
 
     fn modes(&mut self, term: &Unnamed, axes: &[usize]) {
@@ -256,6 +282,31 @@ impl Simulation {
             }
         }
         self.rate[axis] = rates;
+    }
+
+    /// Adds to the rate of an axis white noise and `weight` times the same `lag` samples later, standard deviation of both
+    /// together deg/s. What came while no sample was taken comes again too.
+    fn add_echo(&mut self, axis: usize, size: f64, lag: usize, weight: f64) {
+        let own = size / (1.0 + weight * weight).sqrt();
+        // No longer than the run: what began before it is as good as any other.
+        let mut held = vec![0.0; lag.min(self.samples).max(1)];
+        for v in &mut held {
+            *v = self.normal();
+        }
+        let mut at = 0;
+        for k in 0..self.stretches.len() {
+            let Stretch { samples, skipped } = self.stretches[k].clone();
+            for _ in 0..skipped.min(held.len()) {
+                held[at] = self.normal();
+                at = (at + 1) % held.len();
+            }
+            for i in samples {
+                let now = self.normal();
+                self.rate[axis][i] += own * (now + weight * held[at]);
+                held[at] = now;
+                at = (at + 1) % held.len();
+            }
+        }
     }
 
     /// Adds to the rate of an axis a tone of steady size, standard deviation deg/s, that goes round its places: centre and full

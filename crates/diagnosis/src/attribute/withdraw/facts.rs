@@ -43,8 +43,6 @@ const SAME_SWING: f64 = 1.5;
 /// Standard errors beyond which readings come again more often than by chance, and within which a correlation is none.
 const COMES_AGAIN: f64 = 5.0;
 const NO_FILTER: f64 = 3.3;
-/// Share of what tells a term that has the shape of an echo, up to which the echo is another thing.
-const OF_ECHO: f64 = 0.4;
 
 /// What is left on a channel.
 #[derive(Clone, Debug, Default)]
@@ -83,8 +81,6 @@ pub(super) struct Facts<'a> {
     pub(super) followed: Vec<(&'static str, f64)>,
     /// A recorded channel at whose frequency a line of the model swings.
     swing: Option<String>,
-    /// The lag of an echo, samples, where correlation is left at that one.
-    echo: Option<usize>,
 }
 
 /// Whether an angular frequency, rad per sample, lies in a place.
@@ -135,7 +131,6 @@ impl<'a> Facts<'a> {
             bent: 0.0,
             followed: followers(s, &g),
             swing: s.state.terms.iter().find_map(|t| swings_as(s, t)),
-            echo: residual::echo(&s.e),
             g,
         };
         facts.bent = (left.late + bent(s, failing)) * facts.shown();
@@ -290,26 +285,10 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Whether correlation is left that a term may be a part of: all of it but an echo, a correlation at one lag, whose shape
-    /// is not the term's.
-    pub(super) fn correlated(&self, t: &Term, own: &[f64]) -> bool {
-        self.fails(CheckId::LjungBox)
-            && self.echo.is_none_or(|lag| {
-                let information = self.information(t, own);
-                let omega = &self.s.search.panel.bins.at.omega;
-                shared_with_ripple(&information, &self.counts, omega, lag) > OF_ECHO
-            })
-    }
-
     /// Whether a band that explains so much may be what a spectrum of no kind beside it is off by.
     pub(super) fn is_of_a_spectrum(&self, lr: f64) -> bool {
         let mut terms = self.s.state.terms.iter();
         terms.any(|o| o.is_any_spectrum() && REMAINDER_PROCESS * o.lr > lr)
-    }
-
-    /// Whether correlation is left that is no echo.
-    pub(super) fn correlated_otherwise(&self) -> bool {
-        self.fails(CheckId::LjungBox) && self.echo.is_none()
     }
 
     /// Whether readings that are those before make neighbours correlate.
@@ -321,25 +300,6 @@ impl<'a> Facts<'a> {
     pub(super) fn variance_everywhere(&self) -> bool {
         let n = self.s.search.panel.bins.n as f64;
         everywhere(self.s, &|k| self.within(k as f64 * PI / n))
-    }
-}
-
-/// Share of the information of a density that an echo at a lag has too: of its part of the variance by bin, what the ripple
-/// cos(w lag) holds.
-fn shared_with_ripple(information: &[f64], counts: &[f64], omega: &[f64], lag: usize) -> f64 {
-    // Deviations of ln variance by the square root of what they tell.
-    let deviations = information.iter().zip(counts);
-    let deviations: Vec<f64> = deviations.map(|(i, m)| (i / m).max(0.0).sqrt()).collect();
-    let ripple: Vec<f64> = omega.iter().map(|w| (w * lag as f64).cos()).collect();
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        let terms = a.iter().zip(b).zip(counts);
-        terms.map(|((a, b), m)| a * b * m).sum()
-    };
-    let all = product(&deviations, &deviations) * product(&ripple, &ripple);
-    if all > 0.0 {
-        product(&deviations, &ripple).powi(2) / all
-    } else {
-        1.0
     }
 }
 

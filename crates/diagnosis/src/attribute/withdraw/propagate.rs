@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, TOUCHED, generic};
 use super::{Doubt, nearest_of};
 use crate::criticise::residual;
-use crate::fit::channel;
 use crate::fit::channel::{Form, Term, VarianceFound, is_wide};
 use crate::result::{Check, Finding};
 use crate::search::searched::Searched;
@@ -89,7 +88,7 @@ impl Kin<'_> {
         let acts = self.acts(t, own);
         let mut terms = self.facts.s.state.parts().zip(doubts);
         terms.any(|((o, of_other), d)| {
-            let follows = o.effect.id() == channel::ID || *d != Doubt::No && !generic(o);
+            let follows = o.is_combination() || *d != Doubt::No && !generic(o);
             let process = *d != Doubt::No && o.is_covariance() && !o.is_filter();
             follows && o.lr > t.lr
                 || process && REMAINDER_PROCESS * self.explains_there(o, of_other, &acts) > t.lr
@@ -127,7 +126,7 @@ impl Kin<'_> {
             .filter(|v| self.variance && v.lr > DEPARTURE * explained)
             .filter_map(|v| v.follows.as_ref());
         let terms = self.facts.s.state.terms.iter().zip(doubts);
-        let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.effect.id() == channel::ID);
+        let by_terms = terms.filter(|(o, d)| **d != Doubt::No || o.is_combination());
         let by_checks = self.facts.left.about.iter();
         let others: BTreeSet<&String> = by_terms
             .filter(|(o, _)| o.effect.id() != t.effect.id() && o.lr > DEPARTURE * explained)
@@ -162,7 +161,7 @@ impl Kin<'_> {
                     || self.with_a_hump(t, own)
                     || line.is_some() && self.facts.repeats.is_some()
                     || t.is_filter() && self.facts.fails(CheckId::VarianceLaw);
-                *doubt == Doubt::No && !t.is_band() && of_kind
+                *doubt == Doubt::No && !t.is_band() && t.lag().is_none() && of_kind
             })
             .collect();
         for (doubt, falls) in doubts.iter_mut().zip(falls) {
@@ -177,8 +176,7 @@ impl Kin<'_> {
         let source = v.follows.as_ref();
         let by_term = |(t, doubt): (&Term, &Doubt)| {
             let follows = |s: &String| self.facts.s.search.sources(t).contains(s);
-            t.effect.id() == channel::ID && t.lr > v.lr
-                || *doubt != Doubt::No && source.is_some_and(follows)
+            t.is_combination() && t.lr > v.lr || *doubt != Doubt::No && source.is_some_and(follows)
         };
         self.facts.fails(CheckId::VarianceFollows)
             || self.facts.bent > LEFT * v.lr

@@ -139,12 +139,12 @@ const TERMS: &[Rule] = &[
     Rule {
         name: "correlation that is left, nowhere else",
         of: stationary,
-        holds: |f, t| f.places.is_empty() && f.correlated(t.term, t.own),
+        holds: |f, _| f.places.is_empty() && f.fails(CheckId::LjungBox),
     },
     Rule {
         name: "a filter leaves no correlation",
         of: filter,
-        holds: |f, t| f.correlated(t.term, t.own),
+        holds: |f, _| f.fails(CheckId::LjungBox),
     },
     Rule {
         name: "codes or interpolation make neighbours alike",
@@ -247,6 +247,10 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
             None => Doubt::No,
         };
     }
+    // It has no name that could fall.
+    if t.term.lag().is_some() {
+        return Doubt::No;
+    }
     if t.term.is_any_spectrum() {
         return Doubt::Spectrum;
     }
@@ -277,7 +281,7 @@ pub(super) fn variance_withdrawn(f: &Facts<'_>) -> bool {
     OF_VARIANCE.into_iter().any(|id| f.fails(id))
         || f.without_place()
         || if f.places.is_empty() {
-            f.correlated_otherwise() || f.fails(CheckId::TimeFrequency)
+            f.fails(CheckId::LjungBox) || f.fails(CheckId::TimeFrequency)
         } else {
             !f.variance_everywhere()
         }

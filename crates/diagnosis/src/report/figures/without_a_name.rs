@@ -1,7 +1,7 @@
 //! What follows recorded channels as no effect of the library does, over time.
 
 use super::{is_course, of_terms};
-use crate::fit::channel::{ID, Term};
+use crate::fit::channel::Term;
 use crate::ingest::types::Grid;
 use crate::result::Evidence;
 use crate::search::searched::Searched;
@@ -11,7 +11,7 @@ use crate::search::searched::Searched;
 /// over time.
 pub(super) fn of_combinations(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
     let terms = &s.state.terms;
-    let combinations: Vec<&Term> = terms.iter().filter(|t| t.effect.id() == ID).collect();
+    let combinations: Vec<&Term> = terms.iter().filter(|t| t.is_combination()).collect();
     let first_of_its_kind = |i: usize| {
         let before = &combinations[..i];
         before.iter().all(|b| b.of != combinations[i].of)
