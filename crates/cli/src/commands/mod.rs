@@ -19,6 +19,7 @@ pub mod run;
 pub mod shell;
 pub mod simulate;
 pub mod terminal;
+pub mod usage;
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -135,7 +136,8 @@ fn enough_replicates(text: &str) -> Result<usize, String> {
 impl Input {
     /// Reads a capture by these options; says how many rows were left out.
     pub fn read(&self, path: &Path) -> Result<Read> {
-        let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())?;
+        let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())
+            .map_err(|error| usage::misuse(&error))?;
         let options = ReadOptions {
             mapping,
             rate_hz: self.rate,
@@ -234,7 +236,7 @@ pub struct Line {
     #[arg(long, global = true, value_name = "PORT")]
     port: Option<String>,
     /// Speed of the line
-    #[arg(long, global = true, default_value_t = DEFAULT_BAUD)]
+    #[arg(long, global = true, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(1..))]
     baud: u32,
 }
 

@@ -60,7 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             use model::simulate::SimulateError as E;
             let help = match &error {
                 E::BadLength { .. } | E::BadRate { .. } => {
-                    "choose `--seconds` and `--rate` accordingly"
+                    let help = "choose `--seconds` and `--rate` accordingly";
+                    return miette::miette!(code = super::usage::CODE, help = help, "{error}");
                 }
                 _ => "docs/model-file.md lists channels and effects",
             };
