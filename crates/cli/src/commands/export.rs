@@ -155,7 +155,7 @@ fn data(arguments: &Arguments, to: To) -> Result<()> {
     }
     Outputs::beside([&arguments.file]).data("--out", Some(out))?;
     let read = arguments.input.read(&arguments.file)?;
-    super::tell(&arguments.file, &read.record);
+    arguments.input.tell(&arguments.file, &read.record);
     let table = Table::of(&read.record, arguments.raw);
     let written = match to {
         To::Npz => table.write_npz(out),
@@ -279,7 +279,7 @@ fn analyzed(
     is_wanted: &dyn Fn(&str) -> bool,
 ) -> Result<Analysis> {
     let mut read = arguments.input.read(path)?;
-    super::tell(path, &read.record);
+    arguments.input.tell(path, &read.record);
     read.record.channels.retain(|c| is_wanted(&c.name));
     let options = AnalyzeOptions {
         seed: arguments.seed,

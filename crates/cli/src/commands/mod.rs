@@ -175,7 +175,7 @@ impl Input {
                 name(path)
             );
         }
-        if read.skipped > 0 {
+        if read.skipped > 0 && !self.quiet {
             warn!(
                 "{}: rows that cannot be read and are left out: {}",
                 path.display(),
@@ -183,6 +183,13 @@ impl Input {
             );
         }
         Ok(read)
+    }
+
+    /// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
+    pub fn tell(&self, path: &Path, record: &model::record::Record) {
+        for note in record.notes.iter().filter(|_| !self.quiet) {
+            warn!("{}: {note}", path.display());
+        }
     }
 }
 
@@ -220,13 +227,6 @@ fn unreadable(path: &Path, error: &std::io::Error) -> miette::Report {
         _ => "is the disk, or the line to it, in order?",
     };
     miette::miette!(help = help, "cannot read {}: {error}", path.display())
-}
-
-/// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
-pub fn tell(path: &Path, record: &model::record::Record) {
-    for note in &record.notes {
-        warn!("{}: {note}", path.display());
-    }
 }
 
 /// Where the board is; the same for every command that talks to one.

@@ -144,7 +144,7 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
     let (channel, rate) = (arguments.channel.as_deref(), arguments.input.rate);
     if let Some(path) = &arguments.capture {
         let record = arguments.input.read(path)?.record;
-        super::tell(path, &record);
+        arguments.input.tell(path, &record);
         return of_record(&record, &super::name(path), channel, rate, arguments.seed);
     }
     match &arguments.model {

@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .iter()
         .map(|path| {
             let record = arguments.input.read(path)?.record;
-            super::tell(path, &record);
+            arguments.input.tell(path, &record);
             Ok(record)
         })
         .collect::<Result<Vec<_>>>()?;

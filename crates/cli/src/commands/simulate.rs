@@ -49,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let rate = arguments.rate.unwrap_or(model.rate_hz);
-    for (cause, settings) in model::excitation::unexcited(&model) {
+    let unexcited = model::excitation::unexcited(&model).into_iter();
+    for (cause, settings) in unexcited.filter(|_| !arguments.quiet) {
         warn!(
             "warning: {cause} will not show: nothing excites it. help: under [excitation], set {}",
             settings.join(" or ")

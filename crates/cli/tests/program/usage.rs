@@ -60,3 +60,35 @@ fn what_is_wrong_whatever_the_files_hold_and_whatever_is_connected_exits_2() {
     let there = std::fs::read_dir(&folder).expect("the folder").count();
     assert_eq!(there, 1, "nothing was written");
 }
+
+#[test]
+fn quiet_leaves_nothing_but_errors() {
+    use std::fmt::Write as _;
+    let folder = folder("quiet");
+    let mut text = "t,gyro_x\n".to_owned();
+    for k in 0..800 {
+        let reading = match k {
+            100 => "foo".to_owned(),
+            200 => "NaN".to_owned(),
+            k => format!("{}", (k * 7919 + k * k * 31) % 101 - 50),
+        };
+        let _ = writeln!(text, "{},{reading}", f64::from(k) / 20.0);
+    }
+    std::fs::write(folder.join("x.csv"), text).expect("a file");
+    for line in [
+        "analyze x.csv",
+        "diagnose x.csv --no-replicates",
+        "export x.csv --to csv --out e.csv",
+        "plan x.csv --separate temperature,rate_ramp",
+    ] {
+        let said = |quiet: &[&str]| {
+            let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_imu-stand"));
+            program.args(line.split(' ')).args(quiet);
+            program.args(["--skip-bad", "--units", "gyro=deg/s"]);
+            let output = program.current_dir(&folder).output();
+            super::common::assert_success(&output.expect("the program runs"))
+        };
+        assert!(said(&[]).contains("left out"), "{line}");
+        assert_eq!(said(&["--quiet"]), "", "{line}");
+    }
+}

@@ -165,7 +165,7 @@ fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
         });
     };
     let record = arguments.input.read(path)?.record;
-    super::tell(path, &record);
+    arguments.input.tell(path, &record);
     let Some(channel) = record.channel(&arguments.channel) else {
         let names: Vec<_> = record.channels.iter().map(|c| c.name.as_str()).collect();
         miette::bail!(

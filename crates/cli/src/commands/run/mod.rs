@@ -381,7 +381,7 @@ fn planned(arguments: &Arguments) -> Result<Plan> {
             path.display()
         )
     })?;
-    for what in &carried.not {
+    for what in carried.not.iter().filter(|_| !arguments.quiet) {
         warn!("warning: not on the stand: {what}");
     }
     Ok(plan)
