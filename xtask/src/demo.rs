@@ -10,6 +10,39 @@ use crate::{build_image, cargo, toolchain};
 /// What is hidden where nobody says what, and the seed: the run of the README, with a figure that shows it.
 const HIDE: &str = "tempco";
 const SEED: &str = "5";
+/// What can be hidden: `imu-stand run --hide` knows no other, and is not built yet when this is asked for.
+const KINDS: [&str; 30] = [
+    "random",
+    "none",
+    "tempco",
+    "tempco-curved",
+    "motor-coupling",
+    "motor-noise",
+    "supply-coupling",
+    "vibration",
+    "knock",
+    "stall",
+    "silent-stall",
+    "warm-up",
+    "leak",
+    "slow-filter",
+    "wandering-bias",
+    "trap",
+    "g-sensitivity",
+    "common-noise",
+    "noisy-spell",
+    "glitches",
+    "stuck-bit",
+    "dead-spi",
+    "lossy-line",
+    "shove",
+    "scale-error",
+    "wrong-crystal",
+    "bump",
+    "acc-tempco",
+    "acc-reference",
+    "uncalibrated",
+];
 /// Where its files go, from the root, so that the command in the report can be typed again.
 const FOLDER: &str = "target/demo";
 /// All that the program says.
@@ -37,7 +70,10 @@ fn options(arguments: &[String]) -> Result<Options, Failure> {
     let usage = |what: &str| {
         Failure::new(
             what,
-            "cargo xtask demo [SEED] [--hide KIND]; the kinds: `imu-stand run --help`",
+            &format!(
+                "cargo xtask demo [SEED] [--hide KIND]; the kinds: {}",
+                KINDS.join(", ")
+            ),
         )
     };
     let mut options = Options {
@@ -52,7 +88,15 @@ fn options(arguments: &[String]) -> Result<Options, Failure> {
             rest.next().cloned().ok_or_else(missing)
         };
         match argument.as_str() {
-            "--hide" => options.hide = value()?,
+            "--hide" => {
+                options.hide = value()?;
+                if !KINDS.contains(&options.hide.as_str()) {
+                    return Err(usage(&format!(
+                        "nothing called `{}` can be hidden",
+                        options.hide
+                    )));
+                }
+            }
             "--program" => options.program = Some(PathBuf::from(value()?)),
             seed if seed.parse::<u64>().is_ok() => options.seed = seed.to_owned(),
             other => return Err(usage(&format!("`demo` does not know {other}"))),
@@ -218,5 +262,37 @@ mod tests {
         );
         assert!(of(&["--seed"]).is_err());
         assert!(of(&["--hide"]).is_err());
+        // At once, with what there is.
+        let said = of(&["--hide", "nothing"])
+            .err()
+            .map(|failure| failure.to_string());
+        let said = said.expect("there is none");
+        assert!(
+            said.contains("nothing called `nothing`") && said.contains("none, tempco"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn what_can_be_hidden_is_what_the_program_can_hide() {
+        let source = include_str!("../../crates/cli/src/stand/hidden.rs");
+        let (_, body) = source.split_once("pub enum Hidden {").expect("the enum");
+        let (body, _) = body.split_once('}').expect("its end");
+        let variants = body
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.ends_with(',') && !line.starts_with('/'));
+        let kebab = |name: &str| {
+            let mut text = String::new();
+            for c in name.trim_end_matches(',').chars() {
+                if c.is_uppercase() && !text.is_empty() {
+                    text.push('-');
+                }
+                text.extend(c.to_lowercase());
+            }
+            text
+        };
+        let all: Vec<String> = variants.map(kebab).collect();
+        assert_eq!(all, KINDS);
     }
 }

@@ -132,3 +132,35 @@ fn say_sizes(elf: &Path) -> Result<String, Failure> {
         sizes.flash, sizes.sram
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Failure, fuzz, soak};
+
+    #[test]
+    fn an_option_that_there_is_not_is_named() {
+        let understood = |command: &str, words: &[&str]| -> Result<(), Failure> {
+            let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+            match command {
+                "fuzz" => fuzz::plan(&words).map(|_| ()),
+                _ => soak::plan(&words).map(|_| ()),
+            }
+        };
+        for command in ["fuzz", "soak"] {
+            for (words, told) in [
+                (&["--nix"][..], Some("it knows no --nix")),
+                (&["--seed"], Some("--seed takes a value")),
+                (&["--minutes", "2"], None),
+            ] {
+                let said = understood(command, words).err().map(|f| f.to_string());
+                let is_told = match (&said, told) {
+                    (Some(said), Some(told)) => {
+                        said.contains(told) && said.contains(&format!("cargo xtask {command}"))
+                    }
+                    (said, told) => said.is_none() && told.is_none(),
+                };
+                assert!(is_told, "{command} {words:?}: {said:?}");
+            }
+        }
+    }
+}

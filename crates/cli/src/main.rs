@@ -10,7 +10,16 @@ macro_rules! warn {
     ($($words:tt)*) => { $crate::commands::warn(format_args!($($words)*)) };
 }
 
+/// Returns an error of wrong usage, in the form of `miette::bail!`.
+macro_rules! misused {
+    ($($words:tt)*) => {
+        return Err(miette::miette!(code = $crate::commands::usage::CODE, $($words)*))
+    };
+}
+
 mod commands;
+
+use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
@@ -117,11 +126,16 @@ fn keep_memory() {
     }
 }
 
-fn main() -> miette::Result<()> {
+fn main() -> ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     keep_memory();
-    miette::set_hook(Box::new(|_| Box::new(commands::terminal::Handler::new())))?;
-    match Program::parse().command {
+    // It fails where there is a hook already.
+    let _ = miette::set_hook(Box::new(|_| Box::new(commands::terminal::Handler::new())));
+    commands::usage::exit_code(run(Program::parse().command))
+}
+
+fn run(command: Command) -> miette::Result<()> {
+    match command {
         Command::Analyze(arguments) => commands::analyze::run(&arguments),
         Command::Diagnose(arguments) => commands::diagnose::run(&arguments),
         Command::Paper(arguments) => commands::paper::run(&arguments),

@@ -8,7 +8,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::Scenario;
-use common::{Board, Swallow, assert_refused, assert_success, folder, json, run};
+use common::{Board, Swallow, assert_misused, assert_refused, assert_success, folder, json, run};
 use imu_stand::capture::{ReadOptions, read_capture};
 use model::record::Record;
 
@@ -178,7 +178,7 @@ fn a_hang_up_ends_a_capture_as_ctrl_c_does_and_the_raw_bytes_file_is_no_capture(
     }
     let out = folder.join("run.raw");
     let refused = ended(start(&board, &out, &[]));
-    assert_refused(&refused, &["where the raw bytes go", "run.csv"]);
+    assert_misused(&refused, &["where the raw bytes go", "run.csv"]);
     assert!(!out.exists());
 }
 
@@ -413,10 +413,11 @@ fn driven(name: &str) -> Option<Record> {
     let child = start(
         &board,
         &out,
-        &[&shape[..], &["--period-ms", "1000"]].concat(),
+        &[&shape[..], &["--period-ms", "1000", "--quiet"]].concat(),
     );
     wait_for_rows(&out, 70);
-    end(child);
+    let said = end(child);
+    assert!(!said.contains("driven"), "--quiet: {said}");
     let health = folder.join("health.json");
     assert_success(&board.ask(&["health", "--json", health.to_str().unwrap()]));
     let starved = json(&health)["counters"]["motor_timeout"].as_u64();

@@ -122,7 +122,7 @@ fn two_sample_rates_in_one_file_are_refused_by_all_and_a_span_takes_one() {
         &["report", file],
         &["export", file, "--to", "vins", "--at-rate", "200"],
         &["plan", file, "--want", "K within 20 %"],
-        &["representative", file, file],
+        &["representative", file, file, file, file],
     ] {
         let said = assert_refused(&run(words), &["two sample rates"]);
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -5,7 +5,7 @@ mod common;
 
 use std::path::Path;
 
-use common::{assert_refused, assert_success, folder, run};
+use common::{assert_misused, assert_refused, assert_success, folder, run};
 use imu_stand::export::noise::{Consumer, Figure, ImuNoise};
 use model::ModelFile;
 
@@ -331,7 +331,7 @@ fn the_export_of_a_diagnosis_is_without_what_the_temperature_does() {
         &run(&["export", &json, &model, "--to", "kalibr"]),
         &["two files of one kind"],
     );
-    assert_refused(
+    assert_misused(
         &run(&["export", &capture, &model, "--out", &path("x.npz")]),
         &["data are of one capture"],
     );

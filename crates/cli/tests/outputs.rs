@@ -142,7 +142,7 @@ fn a_dash_is_standard_input_and_output_and_nothing_else_is_said_there() {
     let exported = run(&folder, "export run.csv --to csv --out -");
     assert!(String::from_utf8_lossy(&exported.stdout).contains("time_s,seq"));
     let twice = run(&folder, "diagnose run.csv --json - --report -");
-    assert_eq!(twice.status.code(), Some(1));
+    assert_eq!(twice.status.code(), Some(2));
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn a_capture_is_not_written_to_a_name_that_promises_another_form() {
     ] {
         let output = run(&folder, line);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        assert_eq!(output.status.code(), Some(2), "{line}: {said}");
         assert!(
             said.contains("a capture is CSV") && said.contains("imu-stand export"),
             "{line}: {said}"

@@ -10,6 +10,9 @@ mod times;
 #[path = "program/measured.rs"]
 mod measured;
 
+#[path = "program/usage.rs"]
+mod usage;
+
 use std::path::{Path, PathBuf};
 
 use common::{assert_success, folder, json, run};
@@ -303,12 +306,7 @@ fn of_many_runs_the_one_that_is_noisier_is_not_the_representative_one() {
     let why = String::from_utf8_lossy(&twice.stderr);
     assert!(why.contains("have the same readings"), "{why}");
     let few = run(&["representative", &paths[0], &paths[1]]);
-    assert_eq!(few.status.code(), Some(1));
-    let said = String::from_utf8_lossy(&few.stderr);
-    assert!(
-        said.contains("4 runs") && said.contains("name 4 captures"),
-        "{said}"
-    );
+    common::assert_misused(&few, &["4 runs", "name 4 captures"]);
 }
 
 #[test]

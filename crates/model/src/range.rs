@@ -63,7 +63,16 @@ impl Range {
         let Self { least, most, whole } = self;
         let holds = (least..=most).contains(&value) && !(whole && value.fract() != 0.0);
         let kind = if whole { "a whole number " } else { "" };
+        let [value, least, most] = [value, least, most].map(written);
         (!holds).then(|| format!("{name} is {value}; it has to be {kind}from {least} to {most}"))
+    }
+}
+
+/// A number as a person writes it: `1e300`, and not a one with three hundred zeros.
+pub(crate) fn written(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-4..1e7 => value.to_string(),
+        _ => format!("{value:e}"),
     }
 }
 
@@ -112,5 +121,33 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("delay", _) | (_, "Hz") => range(0.0, LONGEST),
         (_, "s") => range(-LONGEST, LONGEST),
         _ => ANY,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_refused_as_they_are_written() {
+        assert_eq!(
+            ANY.refuses("slope", 1e300).as_deref(),
+            Some("slope is 1e300; it has to be from -1e100 to 1e100")
+        );
+        assert_eq!(
+            POSITIVE.refuses("rate_hz", 0.0).as_deref(),
+            Some("rate_hz is 0; it has to be from 1e-12 to 1e15")
+        );
+        assert_eq!(
+            of_parameter("bit", "1", 20.0)
+                .refuses("bit", -0.5)
+                .as_deref(),
+            Some("bit is -0.5; it has to be a whole number from 0 to 13")
+        );
+        let all = [f64::NAN, f64::INFINITY, -12_345.678, 0.001, 1e-300];
+        assert_eq!(
+            all.map(written),
+            ["NaN", "inf", "-12345.678", "0.001", "1e-300"]
+        );
     }
 }

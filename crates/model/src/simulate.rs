@@ -17,6 +17,7 @@ use crate::effects::double_rounding::Halves;
 use crate::excitation::{Recorded, World, moved_like};
 use crate::file::{ChannelModel, ModelFile};
 use crate::one_source::Felt;
+use crate::range::written;
 use crate::record::{Axis, Quantity, Record};
 use frames::frames;
 use prepared::Prepared;
@@ -40,15 +41,17 @@ const COUNT_LIMIT: i32 = i32::MAX - 1;
 #[non_exhaustive]
 pub enum SimulateError {
     /// A rate that is none.
-    #[error("the rate is {found} Hz; it has to be above 0")]
+    #[error("the rate is {} Hz; it has to be above 0", written(*found))]
     BadRate {
         /// What was given, Hz.
         found: f64,
     },
     /// A length and a rate that make no record together.
     #[error(
-        "{seconds} s at {rate_hz} Hz are {:.0} samples; a simulated record has 1 to {limit}",
-        seconds * rate_hz
+        "{} s at {} Hz are {} samples; a simulated record has 1 to {limit}",
+        written(*seconds),
+        written(*rate_hz),
+        written((seconds * rate_hz).round())
     )]
     BadLength {
         /// Length, s.

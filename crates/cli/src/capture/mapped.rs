@@ -188,7 +188,7 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
 }
 
 /// The place of a column by its name, by its name without a unit, or by its number from 1 on.
-fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
+pub(super) fn place(said: &Said<'_>, theirs: &str) -> Option<usize> {
     let by_stem = || {
         let stems = said.names.iter().map(|name| in_brackets(name).0);
         let mut places = stems.enumerate().filter(|(_, stem)| *stem == theirs);

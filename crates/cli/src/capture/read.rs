@@ -124,7 +124,13 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 &mut layout.cells,
                 said.names.len(),
             )?;
-            return Err(proposed(error, &said, header.rate_hz.is_some(), &seen));
+            return Err(proposed(
+                error,
+                &said,
+                &options.mapping,
+                header.rate_hz.is_some(),
+                &seen,
+            ));
         }
         Ok(found) => found,
     };
@@ -212,7 +218,13 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
     let mut found = columns(&said, &options.mapping).map_err(|error| {
         let part = |of: &Vec<f64>| of.iter().copied().take(ROWS).collect();
         let seen = Seen(table.columns.iter().map(part).collect());
-        proposed(error, &said, header.rate_hz.is_some(), &seen)
+        proposed(
+            error,
+            &said,
+            &options.mapping,
+            header.rate_hz.is_some(),
+            &seen,
+        )
     })?;
     if of == Of::File {
         found.ask()?;

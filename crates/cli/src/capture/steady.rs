@@ -33,14 +33,19 @@ pub(super) fn unsteady(record: &Record) -> Vec<String> {
 /// Share of a record, and samples, from which on a hole has its place said; and how many such holes are no bursts.
 const HOLE: (f64, u64) = (0.01, 10);
 const HOLES: usize = 5;
+/// Samples from which on a step is one whose length nothing tells.
+const UNCOUNTED: u64 = 1 << 40;
 
 /// Where the largest holes are.
 fn holes(record: &Record, times: Option<&[f64]>) -> Option<String> {
     let sampling = Sampling::of(record, None).ok()?;
     let slots = &sampling.slots;
-    let all = slots.last()?.checked_sub(*slots.first()?)?;
+    // Between two rows of one time, say, nothing tells how many there should be.
+    let step = |pair: &[u64]| pair[1].saturating_sub(pair[0]);
+    let counted = |pair: &[u64]| Some(step(pair)).filter(|n| *n < UNCOUNTED).unwrap_or(0);
+    let all: u64 = slots.windows(2).map(counted).sum();
     let least = HOLE.1.max((HOLE.0 * all as f64) as u64);
-    let lost = |pair: &[u64]| pair[1].saturating_sub(pair[0]).saturating_sub(1);
+    let lost = |pair: &[u64]| counted(pair).saturating_sub(1);
     let rows: Vec<usize> = (0..slots.len().saturating_sub(1))
         .filter(|row| lost(&slots[*row..row + 2]) >= least)
         .collect();
@@ -327,6 +332,13 @@ mod tests {
         assert_eq!(told(&|k| if k % 100 == 50 { 0.1 } else { 0.05 }), "");
         let bursts = told(&|k| if k % 100 == 50 { 30.0 } else { 0.05 });
         assert!(!bursts.contains("no rows"), "{bursts}");
+        // Two rows of one time are no hole, and hide none.
+        let twice = |k| match k {
+            300 => 0.0,
+            700 => 5.0,
+            _ => 0.05,
+        };
+        assert_eq!(told(&twice), "no rows from 34.90 to 39.90 s (99 samples)");
     }
 
     #[test]

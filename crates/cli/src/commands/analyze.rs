@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(long, default_value = "octave")]
     taus: TauGrid,
     /// Only these channels: gyro_x,acc_z,...
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = clap::builder::NonEmptyStringValueParser::new())]
     channels: Option<Vec<String>>,
     /// Print what is to be said against the paper's two figures, and against those that are read off the same way, too
     #[arg(long)]

@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ];
     for (option, given) in one_only {
         if given && captures.len() > 1 {
-            miette::bail!(
+            misused!(
                 help = "diagnose them one by one",
                 "{option} is for one capture"
             );

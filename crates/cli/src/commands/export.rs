@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let to = match (arguments.to, &arguments.out) {
         (Some(to), _) => to,
         (None, Some(out)) => by_ending(out)?,
-        (None, None) => miette::bail!(
+        (None, None) => misused!(
             help = "write `imu-stand export run.csv --out run.parquet`, or `--to kalibr`",
             "into what?"
         ),
@@ -128,7 +128,7 @@ fn by_ending(out: &Path) -> Result<To> {
     ];
     match endings.iter().find(|(ending, _)| name.ends_with(ending)) {
         Some((_, to)) => Ok(*to),
-        None => miette::bail!(
+        None => misused!(
             help = "add `--to`, for example `--to kalibr`; `imu-stand export --help` lists them",
             "{name}: the ending does not say what to write"
         ),
@@ -137,25 +137,25 @@ fn by_ending(out: &Path) -> Result<To> {
 
 fn data(arguments: &Arguments, to: To) -> Result<()> {
     if let Some(beside) = &arguments.beside {
-        miette::bail!(
+        misused!(
             help = "export them one by one",
             "data are of one capture: {} is a second file",
             beside.display()
         );
     }
     let Some(out) = &arguments.out else {
-        miette::bail!(help = "add `--out FILE`", "data are written to a file");
+        misused!(help = "add `--out FILE`", "data are written to a file");
     };
     let is_dash = out.as_os_str() == outputs::DASH;
     if is_dash && to != To::Csv {
-        miette::bail!(
+        misused!(
             help = "name a file, or take `--to csv`",
             "only text goes to standard output"
         );
     }
     Outputs::beside([&arguments.file]).data("--out", Some(out))?;
     let read = arguments.input.read(&arguments.file)?;
-    super::tell(&arguments.file, &read.record);
+    arguments.input.tell(&arguments.file, &read.record);
     let table = Table::of(&read.record, arguments.raw);
     let written = match to {
         To::Npz => table.write_npz(out),
@@ -279,7 +279,7 @@ fn analyzed(
     is_wanted: &dyn Fn(&str) -> bool,
 ) -> Result<Analysis> {
     let mut read = arguments.input.read(path)?;
-    super::tell(path, &read.record);
+    arguments.input.tell(path, &read.record);
     read.record.channels.retain(|c| is_wanted(&c.name));
     let options = AnalyzeOptions {
         seed: arguments.seed,

@@ -19,6 +19,7 @@ pub mod run;
 pub mod shell;
 pub mod simulate;
 pub mod terminal;
+pub mod usage;
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -135,7 +136,8 @@ fn enough_replicates(text: &str) -> Result<usize, String> {
 impl Input {
     /// Reads a capture by these options; says how many rows were left out.
     pub fn read(&self, path: &Path) -> Result<Read> {
-        let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())?;
+        let mapping = ColumnMapping::parse(self.columns.as_deref(), self.units.as_deref())
+            .map_err(|error| usage::misuse(&error))?;
         let options = ReadOptions {
             mapping,
             rate_hz: self.rate,
@@ -173,7 +175,7 @@ impl Input {
                 name(path)
             );
         }
-        if read.skipped > 0 {
+        if read.skipped > 0 && !self.quiet {
             warn!(
                 "{}: rows that cannot be read and are left out: {}",
                 path.display(),
@@ -181,6 +183,13 @@ impl Input {
             );
         }
         Ok(read)
+    }
+
+    /// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
+    pub fn tell(&self, path: &Path, record: &model::record::Record) {
+        for note in record.notes.iter().filter(|_| !self.quiet) {
+            warn!("{}: {note}", path.display());
+        }
     }
 }
 
@@ -220,13 +229,6 @@ fn unreadable(path: &Path, error: &std::io::Error) -> miette::Report {
     miette::miette!(help = help, "cannot read {}: {error}", path.display())
 }
 
-/// Says on standard error what was wrong with the rows of a capture, for commands whose results have no place for it.
-pub fn tell(path: &Path, record: &model::record::Record) {
-    for note in &record.notes {
-        warn!("{}: {note}", path.display());
-    }
-}
-
 /// Where the board is; the same for every command that talks to one.
 #[derive(Args)]
 pub struct Line {
@@ -234,7 +236,7 @@ pub struct Line {
     #[arg(long, global = true, value_name = "PORT")]
     port: Option<String>,
     /// Speed of the line
-    #[arg(long, global = true, default_value_t = DEFAULT_BAUD)]
+    #[arg(long, global = true, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(1..))]
     baud: u32,
 }
 

@@ -56,7 +56,7 @@ pub fn named_as_text(option: &str, path: &Path) -> Result<()> {
     let ending = path.extension().and_then(|ending| ending.to_str());
     let ending = ending.map(str::to_ascii_lowercase).unwrap_or_default();
     if OTHER_TABLES.contains(&ending.as_str()) {
-        miette::bail!(
+        misused!(
             help = "name it .csv or .csv.gz; `imu-stand export run.csv --out run.npz` (or .parquet) makes another form of it",
             "{option}: {}: a capture is CSV, and would not be what its name says",
             path.display()
@@ -116,7 +116,7 @@ impl Outputs {
         let Some(path) = path else { return Ok(None) };
         if path.as_os_str() == DASH {
             if STDOUT_IS_TAKEN.swap(true, Ordering::Relaxed) {
-                miette::bail!(
+                misused!(
                     help = "name a file for all but one of them",
                     "{option}: two results cannot both go to standard output"
                 );
@@ -125,12 +125,12 @@ impl Outputs {
         }
         if let Some((other, _)) = self.taken.iter().find(|(_, taken)| same(taken, path)) {
             match *other {
-                "" => miette::bail!(
+                "" => misused!(
                     help = "name another file",
                     "{option}: {} is read by this command, and is not written over",
                     path.display()
                 ),
-                other => miette::bail!(
+                other => misused!(
                     help = "name two files",
                     "{option}: {other} writes {}, too",
                     path.display()

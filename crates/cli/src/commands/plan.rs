@@ -75,12 +75,16 @@ fn separate(text: &str) -> std::result::Result<String, String> {
 fn understood(text: &str, request: &Request<'_>) -> std::result::Result<String, String> {
     match request.check_words() {
         Ok(()) => Ok(text.to_owned()),
-        Err(error) => Err(format!(
-            "{error}; {}",
-            error
-                .help()
-                .map_or_else(String::new, |help| help.to_string())
-        )),
+        Err(error) => {
+            // Which option it is, clap says.
+            let what = error.to_string();
+            let what = what
+                .split_once(": ")
+                .map_or(what.as_str(), |(_, what)| what);
+            let help = error.help();
+            let help = help.map_or_else(String::new, |help| format!("; {help}"));
+            Err(format!("{what}{help}"))
+        }
     }
 }
 
@@ -140,7 +144,7 @@ fn noise(arguments: &Arguments) -> Result<Noise> {
     let (channel, rate) = (arguments.channel.as_deref(), arguments.input.rate);
     if let Some(path) = &arguments.capture {
         let record = arguments.input.read(path)?.record;
-        super::tell(path, &record);
+        arguments.input.tell(path, &record);
         return of_record(&record, &super::name(path), channel, rate, arguments.seed);
     }
     match &arguments.model {

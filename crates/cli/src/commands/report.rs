@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // Before the work: without a browser there is no PDF.
     let printer = match &arguments.pdf {
         Some(path) if path.as_os_str() == super::outputs::DASH => {
-            miette::bail!(help = "write `--pdf report.pdf`", "--pdf: it takes a file")
+            misused!(help = "write `--pdf report.pdf`", "--pdf: it takes a file")
         }
         Some(path) => Some((Browser::find()?, path)),
         None => None,

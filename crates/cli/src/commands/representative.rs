@@ -38,15 +38,26 @@ struct Answer<'a> {
     found: &'a Representative,
 }
 
+/// Runs of which one can be said to represent the others.
+const LEAST_RUNS: usize = 4;
+
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let captures = many::captures(&arguments.captures)?;
+    if captures.len() < LEAST_RUNS && !arguments.captures.iter().any(|path| path.is_dir()) {
+        misused!(
+            help = "name 4 captures of the same stand at least",
+            "a comparison of runs needs {} runs, and {} are named",
+            LEAST_RUNS,
+            captures.len()
+        );
+    }
     Outputs::beside(&captures).result("--json", arguments.json.as_ref())?;
     let records = captures
         .iter()
         .map(|path| {
             let record = arguments.input.read(path)?.record;
-            super::tell(path, &record);
+            arguments.input.tell(path, &record);
             Ok(record)
         })
         .collect::<Result<Vec<_>>>()?;

@@ -49,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let rate = arguments.rate.unwrap_or(model.rate_hz);
-    for (cause, settings) in model::excitation::unexcited(&model) {
+    let unexcited = model::excitation::unexcited(&model).into_iter();
+    for (cause, settings) in unexcited.filter(|_| !arguments.quiet) {
         warn!(
             "warning: {cause} will not show: nothing excites it. help: under [excitation], set {}",
             settings.join(" or ")
@@ -60,7 +61,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             use model::simulate::SimulateError as E;
             let help = match &error {
                 E::BadLength { .. } | E::BadRate { .. } => {
-                    "choose `--seconds` and `--rate` accordingly"
+                    let help = "choose `--seconds` and `--rate` accordingly";
+                    return miette::miette!(code = super::usage::CODE, help = help, "{error}");
                 }
                 _ => "docs/model-file.md lists channels and effects",
             };

@@ -59,7 +59,7 @@ impl Shown {
         };
         Self {
             message: harmless(&error.to_string()).into_owned(),
-            code: owned(error.code()),
+            code: owned(error.code()).filter(|code| code != super::usage::CODE),
             help: owned(error.help()),
             severity: error.severity(),
             cause: cause.map(Box::new),

@@ -52,6 +52,12 @@ pub(super) fn two_causes(text: &str) -> Result<[&'static dyn Effect; 2]> {
             "--separate: `{text}` is not two causes"
         );
     };
+    if a == b {
+        miette::bail!(
+            help = "write `--separate temperature,rate_ramp`",
+            "--separate: `{text}` is one cause twice, which nothing tells apart"
+        );
+    }
     let find = |id: &str| {
         effect(id).ok_or_else(|| {
             let known: Vec<&str> = EFFECTS.iter().map(|e| e.id()).collect();

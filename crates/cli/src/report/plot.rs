@@ -404,14 +404,14 @@ pub fn tidy(value: f64, digits: usize) -> String {
     let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1))
         .parse()
         .unwrap_or(value);
-    if rounded != 0.0 && rounded.abs() < LEAST_PLAIN {
+    if rounded != 0.0 && !PLAIN.contains(&rounded.abs()) {
         return format!("{rounded:e}");
     }
     format!("{rounded}")
 }
 
-/// Sizes below it are written with an exponent.
-const LEAST_PLAIN: f64 = 1e-4;
+/// Sizes outside are written with an exponent.
+const PLAIN: std::ops::Range<f64> = 1e-4..1e15;
 
 /// A number with that many places; 0 has no sign.
 #[must_use]

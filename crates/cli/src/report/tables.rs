@@ -133,7 +133,8 @@ pub(super) fn replicates(subject: &Subject<'_>) -> Markup {
             }
             p {
                 "The chance that a record of the model strays as far from its simulations as this one, in any of its "
-                "statistics and channels. Up to 0.05 the record is not one of the model."
+                "statistics and channels. Up to 0.05 the model does not hold a channel on which something was found or is left. "
+                "One on which nothing was is as far off in one record of twenty: it has to stray from all of its simulations."
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained};
+use diagnosis::result::{Diagnosed, Diagnosis, Finding, Unexplained, Verdict};
 use model::record::Base;
 
 use super::noise::{self, Shown};
@@ -63,10 +63,12 @@ pub fn diagnosis(diagnosed: &Diagnosed, base: Option<Base>) -> String {
 
 /// Whether simulations of the model that is handed over look like the record: one line.
 fn write_replicates(out: &mut String, d: &Diagnosis) {
-    // A channel on which nothing was found is as far off as this in one record of twenty, and is not told for it.
+    // A channel on which nothing was found is as far off as this in one record of twenty, and is not told for it; nor is one of
+    // a model of which the verdict says that it holds.
     let is_told = |channel: &String| {
         let found = d.findings.iter().any(|f| f.channels.contains(channel));
-        found || d.unexplained.iter().any(|u| u.channel == *channel)
+        let left = || d.unexplained.iter().any(|u| u.channel == *channel);
+        d.verdict == Verdict::Unexplained && (found || left())
     };
     let outside: Vec<String> = (d.replicates.iter())
         .filter(|(channel, r)| !r.after.holds() && is_told(channel))
@@ -234,7 +236,36 @@ fn write_rest(out: &mut String, d: &Diagnosis) {
 
 #[cfg(test)]
 mod tests {
-    use super::shortened;
+    use super::*;
+    use diagnosis::result::{Among, Replicated};
+
+    #[test]
+    fn a_verdict_that_the_model_holds_and_what_is_said_of_its_simulations_agree() {
+        let mut d: Diagnosis = serde_json::from_value(serde_json::json!({
+            "format": "", "input": {"file": "", "seconds": 1.0, "rate_hz": 1.0, "samples": 1, "channels": []},
+            "baseline": {}, "checks": [], "findings": [], "not_tested": [], "verdict": "adequate",
+            // Too small to matter, and taken up by a term.
+            "unexplained": [{"channel": "gyro_x", "what": "kurtosis 3.4 without the unnamed term"}]
+        }))
+        .expect("a diagnosis");
+        // Farther off than 95 of 100 records of the model, and not than all.
+        let after = Among {
+            p_value: 0.03,
+            ..Among::default()
+        };
+        let before = Among::default();
+        d.replicates
+            .insert("gyro_x".into(), Replicated { before, after });
+        let said = |d: &Diagnosis| {
+            let mut out = String::new();
+            write_replicates(&mut out, d);
+            out
+        };
+        let alike = "simulations of this model look like the record on every channel";
+        assert_eq!(said(&d).trim(), alike);
+        d.verdict = Verdict::Unexplained;
+        assert!(said(&d).contains("differ from the record: gyro_x"));
+    }
 
     #[test]
     fn an_entry_is_cut_between_its_parts_and_never_in_its_first() {

@@ -93,8 +93,17 @@ pub fn assert_success(output: &Output) -> String {
 
 /// It failed and said each of these; all that it said.
 pub fn assert_refused(output: &Output, needles: &[&str]) -> String {
+    ended_with(1, output, needles)
+}
+
+/// It was used wrongly and said each of these; all that it said.
+pub fn assert_misused(output: &Output, needles: &[&str]) -> String {
+    ended_with(2, output, needles)
+}
+
+fn ended_with(code: i32, output: &Output, needles: &[&str]) -> String {
     let said = said(output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(output.status.code(), Some(code), "{said}");
     for needle in needles {
         assert!(said.contains(needle), "no `{needle}` in: {said}");
     }

@@ -163,3 +163,34 @@ fn nothing_is_mapped_beside_the_columns_of_a_capture() {
         .record;
     assert_eq!(chosen.channels[0].values, [1.0, 2.0]);
 }
+
+#[test]
+fn where_a_column_is_not_there_the_proposal_is_of_what_was_asked() {
+    let text = "t,gx,gy,gz,ax,ay,az\n0,1,2,3,0,0,1\n0.1,2,1,3,0,0,1\n0.2,1,2,2,0,0,1\n";
+    let proposal = |columns: &str, units: &str| {
+        let said = error(text.as_bytes(), columns, units);
+        assert!(said.contains("there is no column `nix`"), "{said}");
+        let (_, line) = said.split_once("--columns ").expect("a proposal");
+        line.to_owned()
+    };
+    assert_eq!(
+        proposal("gyro_x=nix", ""),
+        "time=t,gyro_x=gx --units gyro=UNIT"
+    );
+    assert_eq!(
+        proposal("acc_z=nix,time=t,acc_x=ax", "acc=g"),
+        "acc_z=az,time=t,acc_x=ax --units acc=g"
+    );
+    // What is in the file for something else is not given twice, and what nothing is like is left to the reader.
+    assert_eq!(
+        proposal("gyro_x=nix,gyro_y=gx,supply=nix", "gyro=deg/s"),
+        "time=t,gyro_x=COLUMN,gyro_y=gx,supply=COLUMN --units gyro=deg/s"
+    );
+    // The columns of a capture need no mapping.
+    let capture = "# format: imu-stand-capture/1\n# rate_hz: 20\n# gyro_lsb_dps: 0.07326\ngyro_x,gyro_y\n1,2\n2,3\n";
+    let said = error(capture.as_bytes(), "gyro_x=nix", "");
+    assert!(
+        said.contains("the columns are: gyro_x, gyro_y") && said.contains("leave it out"),
+        "{said}"
+    );
+}

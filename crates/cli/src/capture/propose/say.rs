@@ -2,16 +2,19 @@
 
 use crate::text::shell_word;
 
-use super::super::CaptureError;
 use super::super::columns::Said;
 use super::super::error::{brief, brief_list};
-use super::guess;
+use super::super::mapped::place;
+use super::super::{CaptureError, ColumnMapping};
 use super::seen::Seen;
+use super::{Guess, alias, guess};
 
 /// Bytes of a name beyond which its number is easier to write.
 const LONG: usize = 80;
 /// Stands where a unit has to be put in: no unit is called so, and a mapping with it is refused.
 const UNIT: &str = "UNIT";
+/// Stands where nothing says which column is meant.
+const COLUMN: &str = "COLUMN";
 
 /// `--columns ... --units ...`, and what it leaves open.
 pub(super) struct Proposal {
@@ -30,15 +33,78 @@ pub(super) fn proposal(
     knows_rate: bool,
     seen: &Seen,
 ) -> Proposal {
-    let guess = guess(names, numbered, seen);
+    line_of(
+        &guess(names, numbered, seen),
+        &[],
+        names,
+        numbered,
+        knows_rate,
+    )
+}
+
+/// What was asked for, where a column of it is not there: the file's best guess stands in its place, and the time beside it, which
+/// the rows need.
+fn asked(guess: Guess, said: &Said<'_>, mapping: &ColumnMapping, knows_rate: bool) -> Guess {
+    let ours = |given: &str| alias(given).unwrap_or_else(|| given.to_owned());
+    let there: Vec<Option<usize>> = (mapping.columns.iter())
+        .map(|(_, theirs)| place(said, theirs))
+        .collect();
+    let is_free = |at: &usize| !there.contains(&Some(*at));
+    let guessed = |name: &str| {
+        let column = guess.columns.iter().find(|(guessed, _)| guessed == name);
+        column.map(|(_, at)| *at).filter(is_free)
+    };
+    let mut columns: Vec<(String, usize)> = (mapping.columns.iter().zip(&there))
+        .map(|((given, _), at)| {
+            let at = at.or_else(|| guessed(&ours(given)));
+            (given.clone(), at.unwrap_or(usize::MAX))
+        })
+        .collect();
+    let is_time = |given: &str| matches!(ours(given).as_str(), "time" | "host_time_s");
+    if !knows_rate
+        && !columns.iter().any(|(given, _)| is_time(given))
+        && let Some(at) = guessed("time")
+    {
+        columns.insert(0, ("time".to_owned(), at));
+    }
+    let is_asked = |key: &str| {
+        columns
+            .iter()
+            .any(|(given, _)| ours(given).starts_with(key))
+    };
+    let is_given = |key: &str| {
+        let given = mapping.units.iter();
+        given.map(|(given, _)| given).any(|given| given == key)
+    };
+    let units = guess.units.into_iter();
+    let units = units
+        .filter(|(key, _)| is_asked(key) && !is_given(key))
+        .collect();
+    Guess {
+        columns,
+        units,
+        is_ambiguous: guess.is_ambiguous,
+    }
+}
+
+/// Options of a mapping, with units that were `given` before those that are guessed.
+fn line_of(
+    guess: &Guess,
+    given: &[(String, String)],
+    names: &[String],
+    numbered: bool,
+    knows_rate: bool,
+) -> Proposal {
     let is_twice = |name: &String| names.iter().filter(|other| *other == name).count() > 1;
-    let twice = guess.columns.iter().map(|(_, at)| &names[*at]);
+    let twice = guess.columns.iter().filter_map(|(_, at)| names.get(*at));
     let twice = twice
         .filter(|_| !numbered)
         .find(|name| is_twice(name))
         .cloned();
     let column = |(ours, at): &(String, usize)| {
-        let name = &names[*at];
+        let Some(name) = names.get(*at) else {
+            return format!("{ours}={COLUMN}");
+        };
         // What would be taken for the list's own commas goes by its number, and so do a name that two columns have and none at
         // all, as pandas gives an index.
         if numbered
@@ -53,7 +119,9 @@ pub(super) fn proposal(
         }
     };
     let mut open = Vec::new();
-    let mut units = Vec::new();
+    let mut units: Vec<String> = (given.iter())
+        .map(|(key, unit)| format!("{key}={unit}"))
+        .collect();
     for (key, said) in &guess.units {
         match (*key, *said) {
             // Seconds go without saying; other times are guessed by nobody.
@@ -92,13 +160,35 @@ pub(in crate::capture) fn unknown(names: &[String], why: String) -> CaptureError
 pub(in crate::capture) fn proposed(
     error: CaptureError,
     said: &Said<'_>,
+    mapping: &ColumnMapping,
     knows_rate: bool,
     seen: &Seen,
 ) -> CaptureError {
     let CaptureError::Columns { why, columns, .. } = error else {
         return error;
     };
-    let Proposal { line, open, twice } = proposal(said.names, said.numbered, knows_rate, seen);
+    let is_there = |(_, theirs): &(String, String)| place(said, theirs).is_some();
+    let lacks_one = !mapping.columns.iter().all(is_there);
+    if lacks_one && said.lines.get("format").is_some() {
+        return CaptureError::Option {
+            option: "--columns",
+            why: format!("{why}; the columns are: {}", columns.join(", ")),
+            help: "leave it out: the file is a capture, and all of its columns are read".to_owned(),
+        };
+    }
+    let Proposal { line, open, twice } = if lacks_one {
+        let guess = guess(said.names, said.numbered, seen);
+        let guess = asked(guess, said, mapping, knows_rate);
+        line_of(
+            &guess,
+            &mapping.units,
+            said.names,
+            said.numbered,
+            knows_rate,
+        )
+    } else {
+        proposal(said.names, said.numbered, knows_rate, seen)
+    };
     let mut hint = String::new();
     if said.numbered {
         hint += "; see that the columns are right, which go by their places and values";

@@ -45,9 +45,10 @@ impl Arguments {
     }
 
     /// The file that is written to the board; without a sequence there is one.
-    fn file(&self) -> Result<&PathBuf> {
+    pub(super) fn file(&self) -> Result<&PathBuf> {
         self.file.as_ref().ok_or_else(|| {
             miette::miette!(
+                code = super::super::usage::CODE,
                 help = "write `board calibrate diagnosis.json`, or name a sequence: six-position, turns, heater",
                 "no file to calibrate by"
             )

@@ -138,6 +138,19 @@ pub(super) fn stored_correction(link: &mut Link) -> Result<Option<u16>> {
     }
 }
 
+/// Refuses what no board can do before one is asked.
+fn understood(action: &Action) -> Result<()> {
+    match action {
+        Action::Set(set) => set.check(),
+        Action::Register(register) => register.check(),
+        Action::Motor(motor) => motor.command().map(|_| ()),
+        Action::Calibrate(calibrate) if calibrate.sequence.is_none() => {
+            calibrate.file().map(|_| ())
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let reads = match &arguments.action {
@@ -164,6 +177,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         register::list();
         return Ok(());
     }
+    understood(&arguments.action)?;
     let mut session = Session {
         link: arguments.line.open()?,
         json: arguments.json.clone(),

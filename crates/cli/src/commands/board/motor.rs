@@ -61,7 +61,7 @@ pub struct Arguments {
     #[command(flatten)]
     drive: Drive,
     /// How long, s; without it until Ctrl-C
-    #[arg(long)]
+    #[arg(long, value_parser = super::super::positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
 }
 
@@ -90,13 +90,21 @@ struct Turning {
     cut: Option<Instant>,
 }
 
+impl Arguments {
+    /// What the motor is to do.
+    pub fn command(&self) -> Result<Command> {
+        match self.drive.command() {
+            Some(command) => Ok(command),
+            None => misused!(
+                help = "write `board motor --duty 100`, or `--shape sine --amplitude 120 --period-ms 5000`",
+                "neither duty nor shape"
+            ),
+        }
+    }
+}
+
 pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
-    let Some(command) = arguments.drive.command() else {
-        miette::bail!(
-            help = "write `board motor --duty 100`, or `--shape sine --amplitude 120 --period-ms 5000`",
-            "neither duty nor shape"
-        );
-    };
+    let command = arguments.command()?;
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).into_diagnostic()?;

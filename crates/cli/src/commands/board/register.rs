@@ -36,6 +36,9 @@ pub enum Register {
     List,
 }
 
+/// In place of a name: every register that can be read.
+const ALL: &str = "all";
+
 /// Names of the data sheet.
 const NAMES: [(&str, Part); 21] = [
     ("ENDURANCE", Part::Endurance),
@@ -86,7 +89,7 @@ fn register(text: &str) -> Result<Part> {
     };
     match by_name.map(|(_, part)| *part).or_else(by_address) {
         Some(part) => Ok(part),
-        None => miette::bail!(
+        None => misused!(
             help = "`imu-stand board register list` shows names and addresses",
             "the ADIS16250 has no register `{text}`"
         ),
@@ -196,7 +199,7 @@ pub fn run(session: &mut Session, action: &Register) -> Result<()> {
         Register::Read {
             axis,
             register: text,
-        } if text == "all" => NAMES
+        } if text == ALL => NAMES
             .iter()
             .filter(|(_, part)| part.access() != Access::Write)
             .map(|(_, part)| read(session, *axis, *part))
@@ -204,13 +207,13 @@ pub fn run(session: &mut Session, action: &Register) -> Result<()> {
         Register::Read {
             axis,
             register: text,
-        } => vec![read(session, *axis, register(text)?)?],
+        } => vec![read(session, *axis, readable(text)?)?],
         Register::Write {
             axis,
             register: text,
             value,
             yes,
-        } => vec![write(session, *axis, register(text)?, value, *yes)?],
+        } => vec![write(session, *axis, writable(text, value)?, *yes)?],
     };
     if !session.quiet {
         for content in &contents {
@@ -241,14 +244,53 @@ fn content(axis: AxisName, register: Part, bits: u16) -> Content {
     }
 }
 
-fn read(session: &mut Session, axis: AxisName, register: Part) -> Result<Content> {
+/// A register that can be read, by its name or address.
+fn readable(text: &str) -> Result<Part> {
+    let register = register(text)?;
     if register.access() == Access::Write {
-        miette::bail!(
+        misused!(
             help = "STATUS shows what its commands led to",
             "{} can only be written",
             name(register)
         );
     }
+    Ok(register)
+}
+
+/// A register that can be written, and what.
+fn writable(text: &str, value: &str) -> Result<(Part, u16)> {
+    let register = register(text)?;
+    let Some(bits) = number(value) else {
+        misused!(
+            help = "write 16 bits as 0x0402 or 1026",
+            "`{value}` is no value of a register"
+        );
+    };
+    if register.access() == Access::Read {
+        misused!(
+            help = "`imu-stand board register list` shows what can be written",
+            "{} can only be read",
+            name(register)
+        );
+    }
+    Ok((register, bits))
+}
+
+impl Register {
+    /// What can be wrong with it whatever the board is: asked before a port is opened.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Register::Read { register, .. } if register == ALL => Ok(()),
+            Register::Read { register, .. } => readable(register).map(|_| ()),
+            Register::Write {
+                register, value, ..
+            } => writable(register, value).map(|_| ()),
+            Register::List => Ok(()),
+        }
+    }
+}
+
+fn read(session: &mut Session, axis: AxisName, register: Part) -> Result<Content> {
     let reply = session.link.ask(Command::ReadRegister {
         gyro: axis.into(),
         address: register.address(),
@@ -259,23 +301,9 @@ fn read(session: &mut Session, axis: AxisName, register: Part) -> Result<Content
 fn write(
     session: &mut Session,
     axis: AxisName,
-    register: Part,
-    value: &str,
+    (register, bits): (Part, u16),
     yes: bool,
 ) -> Result<Content> {
-    let Some(bits) = number(value) else {
-        miette::bail!(
-            help = "write 16 bits as 0x0402 or 1026",
-            "`{value}` is no value of a register"
-        );
-    };
-    if register.access() == Access::Read {
-        miette::bail!(
-            help = "`imu-stand board register list` shows what can be written",
-            "{} can only be read",
-            name(register)
-        );
-    }
     let danger = match register {
         Part::Command => {
             Some("COMMAND resets the part, moves its bias or wears its flash (20 000 writes)")

@@ -4,9 +4,11 @@ use std::time::{Duration, Instant};
 
 use clap::{Subcommand, ValueEnum};
 use imu_stand::link::{self, LinkError, baud_of, divisor};
+use imu_stand::report::plot::tidy;
 use miette::Result;
 use wire::{Axis, Command, Hello, Sample, Status};
 
+use super::super::usage::misuse;
 use super::Session;
 use super::show::{ACC_RANGES_G, Q16, Q24, gyro_range_dps};
 
@@ -87,6 +89,23 @@ pub enum Set {
     },
 }
 
+impl Set {
+    /// What can be wrong with it whatever the board is: asked before a port is opened.
+    pub fn check(&self) -> Result<()> {
+        match *self {
+            Set::Rate { hz } => is_rate(hz),
+            Set::Gyro { range, filter } => gyro_range(range, filter).map(|_| ()),
+            Set::AccRange { g } => acc_range(g).map(|_| ()),
+            Set::Bias { dps, .. } => fixed(dps, Q16, "bias")
+                .map(|_| ())
+                .map_err(|error| misuse(error.as_ref())),
+            Set::Scale { dps_per_count, .. } => scale(dps_per_count).map(|_| ()),
+            Set::Baud { baud } => divisor_of(baud).map(|_| ()),
+            Set::MotorLimits { .. } | Set::BoardId { .. } => Ok(()),
+        }
+    }
+}
+
 /// A value in fixed point.
 pub fn fixed(value: f64, unit: f64, what: &str) -> Result<i32> {
     let scaled = (value * unit).round();
@@ -95,7 +114,8 @@ pub fn fixed(value: f64, unit: f64, what: &str) -> Result<i32> {
     }
     miette::bail!(
         help = "biases are some deg/s, scale factors about 0.07 deg/s for each count",
-        "{what}: {value} does not fit into the board's fixed point"
+        "{what}: {} does not fit into the board's fixed point",
+        tidy(value, 6)
     )
 }
 
@@ -104,15 +124,9 @@ pub fn run(session: &mut Session, set: &Set) -> Result<()> {
     let command = match *set {
         Set::Rate { hz } => rate(&hello, hz)?,
         Set::Gyro { range, filter } => gyro(&hello, range, filter)?,
-        Set::AccRange { g } => {
-            let Some(range) = ACC_RANGES_G.iter().position(|full| *full == g) else {
-                miette::bail!(
-                    help = "write `board set acc-range 1.5`",
-                    "the accelerometer has ranges of 1.5, 2, 4 and 6 g, not {g} g"
-                );
-            };
-            Command::SetAccRange { range: range as u8 }
-        }
+        Set::AccRange { g } => Command::SetAccRange {
+            range: acc_range(g)?,
+        },
         Set::Bias { axis, dps } => Command::SetBias {
             axis: axis.into(),
             value: fixed(dps, Q16, "bias")?,
@@ -120,18 +134,10 @@ pub fn run(session: &mut Session, set: &Set) -> Result<()> {
         Set::Scale {
             axis,
             dps_per_count,
-        } => {
-            if dps_per_count <= 0.0 {
-                miette::bail!(
-                    help = "0.07326 is the nominal one at 320 deg/s",
-                    "a scale factor of {dps_per_count} deg/s for each count turns the rate around or off"
-                );
-            }
-            Command::SetScale {
-                axis: axis.into(),
-                value: fixed(dps_per_count, Q24, "scale")?,
-            }
-        }
+        } => Command::SetScale {
+            axis: axis.into(),
+            value: scale(dps_per_count)?,
+        },
         Set::Baud { baud } => return set_baud(session, &hello, baud),
         Set::MotorLimits { max_duty, ramp } => Command::MotorLimits {
             max_duty,
@@ -166,13 +172,76 @@ const MOST_HZ: f64 = 256.0;
 /// Share of a line's capacity that samples may take: the rest is for health, hello, replies.
 const LINE_SHARE: f64 = 0.85;
 
-fn rate(hello: &Hello, hz: f64) -> Result<Command> {
+fn is_rate(hz: f64) -> Result<()> {
     if !(LEAST_HZ..=MOST_HZ).contains(&hz) {
-        miette::bail!(
+        misused!(
             help = "write `board set rate 20`",
-            "the board samples at {LEAST_HZ} to {MOST_HZ} Hz, not at {hz} Hz"
+            "the board samples at {LEAST_HZ} to {MOST_HZ} Hz, not at {} Hz",
+            tidy(hz, 6)
         );
     }
+    Ok(())
+}
+
+/// Number of a range of the accelerometer.
+fn acc_range(g: f64) -> Result<u8> {
+    match ACC_RANGES_G.iter().position(|full| *full == g) {
+        Some(range) => Ok(range as u8),
+        None => misused!(
+            help = "write `board set acc-range 1.5`",
+            "the accelerometer has ranges of 1.5, 2, 4 and 6 g, not {} g",
+            tidy(g, 6)
+        ),
+    }
+}
+
+/// A scale factor in fixed point.
+fn scale(dps_per_count: f64) -> Result<i32> {
+    match fixed(dps_per_count, Q24, "scale") {
+        Ok(value) if value > 0 => Ok(value),
+        Ok(_) => misused!(
+            help = "0.07326 is the nominal one at 320 deg/s",
+            "a scale factor of {} deg/s for each count turns the rate around or off",
+            tidy(dps_per_count, 6)
+        ),
+        Err(error) => Err(misuse(error.as_ref())),
+    }
+}
+
+/// Code of a range of the gyros, where one is asked for.
+fn gyro_range(range: Option<u16>, filter: Option<u8>) -> Result<Option<u8>> {
+    let Some(dps) = range else {
+        if filter.is_none() {
+            misused!(
+                help = "write `board set gyro --range 160 --filter 3`",
+                "nothing to set: neither range nor filter"
+            );
+        }
+        return Ok(None);
+    };
+    let is_it = |code: &u8| gyro_range_dps(*code) == Some(f64::from(dps));
+    match [4u8, 2, 1].into_iter().find(is_it) {
+        Some(code) => Ok(Some(code)),
+        None => misused!(
+            help = "write `board set gyro --range 320`",
+            "the gyros have ranges of 320, 160 and 80 deg/s, not {dps} deg/s"
+        ),
+    }
+}
+
+/// What the board divides its clock by for a speed of the line.
+fn divisor_of(baud: u32) -> Result<u16> {
+    match divisor(baud) {
+        Some(divisor) => Ok(divisor),
+        None => misused!(
+            help = "9600, 19200, 38400, 76800, 250000 and 500000 baud are within 0.2 %",
+            "the board's 16 MHz come no nearer than 2 % to {baud} baud"
+        ),
+    }
+}
+
+fn rate(hello: &Hello, hz: f64) -> Result<Command> {
+    is_rate(hz)?;
     let ticks = (1e9 / f64::from(hello.tick_ns.max(1)) / hz).round();
     // A period that the 16-bit timer cannot hold is that many shorter ones.
     let periods = (ticks / LONGEST_PERIOD).ceil();
@@ -208,41 +277,15 @@ fn rate(hello: &Hello, hz: f64) -> Result<Command> {
 }
 
 fn gyro(hello: &Hello, range: Option<u16>, filter: Option<u8>) -> Result<Command> {
-    if range.is_none() && filter.is_none() {
-        miette::bail!(
-            help = "write `board set gyro --range 160 --filter 3`",
-            "nothing to set: neither range nor filter"
-        );
-    }
-    let code = match range {
-        None => hello.gyro_range,
-        Some(dps) => {
-            let code = [4u8, 2, 1]
-                .into_iter()
-                .find(|code| gyro_range_dps(*code) == Some(f64::from(dps)));
-            let Some(code) = code else {
-                miette::bail!(
-                    help = "write `board set gyro --range 320`",
-                    "the gyros have ranges of 320, 160 and 80 deg/s, not {dps} deg/s"
-                );
-            };
-            code
-        }
-    };
     Ok(Command::SetGyro {
-        range: code,
+        range: gyro_range(range, filter)?.unwrap_or(hello.gyro_range),
         filter: filter.unwrap_or(hello.gyro_filter),
     })
 }
 
 /// Sets both ends. A reply that is lost leaves open which speed the board has: it is looked for at both.
 fn set_baud(session: &mut Session, hello: &Hello, baud: u32) -> Result<()> {
-    let Some(new) = divisor(baud) else {
-        miette::bail!(
-            help = "9600, 19200, 38400, 76800, 250000 and 500000 baud are within 0.2 %",
-            "the board's 16 MHz come no nearer than 2 % to {baud} baud"
-        );
-    };
+    let new = divisor_of(baud)?;
     let rate = super::show::rate_hz(hello).unwrap_or(0.0);
     if rate * Sample::FRAME_LEN as f64 * 10.0 > LINE_SHARE * f64::from(baud) {
         let fits = (LINE_SHARE * f64::from(baud) / (Sample::FRAME_LEN as f64 * 10.0)).floor();

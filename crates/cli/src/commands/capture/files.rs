@@ -165,7 +165,7 @@ impl Capture<'_> {
         self.live = Some(live);
         self.files.push(name(&path));
         if is_resumed {
-            self.tell("the capture was resumed")?;
+            self.remark("the capture was resumed")?;
         }
         for (sample, time) in std::mem::take(&mut self.waiting) {
             self.put(&sample, time)?;

@@ -39,7 +39,7 @@ pub struct Arguments {
     #[arg(long)]
     out: PathBuf,
     /// How long, s; without it until Ctrl-C
-    #[arg(long)]
+    #[arg(long, value_parser = super::positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Go on with the file where it ends. First what had arrived and was not written is put in from the raw bytes; the time
     /// between is a gap
@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Write what was captured and lost as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Print nothing but errors
+    /// Print nothing but what is amiss
     #[arg(long, short)]
     quiet: bool,
 }
@@ -154,7 +154,7 @@ struct Capture<'a> {
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if raw_path(&arguments.out) == arguments.out {
-        miette::bail!(
+        misused!(
             help = "write `--out run.csv` or `--out run.csv.gz`: run.raw is written beside it",
             "{} is where the raw bytes go",
             arguments.out.display()
@@ -387,8 +387,22 @@ impl<'a> Capture<'a> {
         eprintln!("{begin}{what}");
     }
 
+    /// What is amiss, said with `--quiet`, too, and kept in the file.
     fn tell(&mut self, what: &str) -> Result<()> {
         self.alert(what);
+        self.keep(what)
+    }
+
+    /// What was asked for and has come about: nothing is amiss.
+    fn remark(&mut self, what: &str) -> Result<()> {
+        if !self.arguments.quiet {
+            self.alert(what);
+        }
+        self.keep(what)
+    }
+
+    /// A note in the file.
+    fn keep(&mut self, what: &str) -> Result<()> {
         let now = self.now();
         if let Some(live) = &mut self.live {
             live.note(now, what)?;

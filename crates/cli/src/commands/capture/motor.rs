@@ -31,7 +31,7 @@ impl Capture<'_> {
         }
         let turned = self.motor.is_alive();
         match self.motor.replied(&reply) {
-            Ok(true) => self.tell("the motor is driven"),
+            Ok(true) => self.remark("the motor is driven"),
             // What the sensors say is in no doubt: the capture goes on.
             Err(LinkError::Refused {
                 status: Status::Stopped,

@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
     web: Option<u16>,
     /// How long, s; without it until q or Ctrl-C
-    #[arg(long)]
+    #[arg(long, value_parser = super::positive, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Write the last view as JSON
     #[arg(long, value_name = "FILE")]

@@ -138,8 +138,19 @@ struct Shown {
     measured: bool,
 }
 
+/// Channels that the paper's figures can be simulated for.
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+
 fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
     let Some(path) = &arguments.capture else {
+        if !GYROS.contains(&arguments.channel.as_str()) {
+            misused!(
+                help = "with --capture it is any gyro of the capture",
+                "--channel: `{}` is none of {}",
+                arguments.channel,
+                GYROS.join(", ")
+            );
+        }
         return Ok(Shown {
             record: simulate(
                 &model_of(stand, &arguments.channel, Some(LSB_DPS)),
@@ -154,7 +165,7 @@ fn shown(arguments: &Arguments, stand: &PaperStand) -> Result<Shown> {
         });
     };
     let record = arguments.input.read(path)?.record;
-    super::tell(path, &record);
+    arguments.input.tell(path, &record);
     let Some(channel) = record.channel(&arguments.channel) else {
         let names: Vec<_> = record.channels.iter().map(|c| c.name.as_str()).collect();
         miette::bail!(

@@ -15,6 +15,7 @@ use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
+use imu_stand::report::plot::tidy;
 use imu_stand::stand::planted::{
     ACCELEROMETERS, Comparison, GYROS, Planted, RULE, compare, planted,
 };
@@ -70,7 +71,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with = "hide")]
     model: Option<PathBuf>,
     /// Length, s: 60 to 86400; with --pty any
-    #[arg(long, default_value_t = 600.0)]
+    #[arg(long, default_value_t = 600.0, allow_negative_numbers = true)]
     seconds: f64,
     /// Seed of all that is random: the same seed gives the same run
     #[arg(long, default_value_t = 1, value_parser = super::seed, allow_negative_numbers = true)]
@@ -145,11 +146,13 @@ fn length(seconds: f64) -> Result<()> {
         "a run is analyzed and diagnosed, and a record under a minute is too short for that: `--seconds 60` is the \
          shortest, 600 the usual length; with --pty any length is served"
     };
-    miette::ensure!(
-        (SHORTEST_S..=LONGEST_S).contains(&seconds),
-        help = help,
-        "--seconds: {seconds} s is not within {SHORTEST_S} .. {LONGEST_S} s"
-    );
+    if !(SHORTEST_S..=LONGEST_S).contains(&seconds) {
+        misused!(
+            help = help,
+            "--seconds: {} s is not within {SHORTEST_S} .. {LONGEST_S} s",
+            tidy(seconds, 6)
+        );
+    }
     Ok(())
 }
 
@@ -196,7 +199,7 @@ pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.line.is_named() && !arguments.correct {
-        miette::bail!(
+        misused!(
             help = "`imu-stand capture --port` records a real board; `run --correct --port` closes the loop on it",
             "--port goes with --correct"
         );
@@ -204,7 +207,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.pty {
         let board = board(arguments)?;
         if arguments.seconds.is_nan() || arguments.seconds <= 0.0 {
-            miette::bail!(
+            misused!(
                 help = "say for how many seconds the board is served: `--seconds 600`",
                 "--seconds: {} is no length",
                 arguments.seconds
@@ -217,7 +220,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     length(arguments.seconds)?;
     if arguments.out.as_os_str() == outputs::DASH {
-        miette::bail!(
+        misused!(
             help = "write `--out run.csv`",
             "--out: the run is read again from its file, and standard output is none"
         );
@@ -378,7 +381,7 @@ fn planned(arguments: &Arguments) -> Result<Plan> {
             path.display()
         )
     })?;
-    for what in &carried.not {
+    for what in carried.not.iter().filter(|_| !arguments.quiet) {
         warn!("warning: not on the stand: {what}");
     }
     Ok(plan)
