@@ -16,7 +16,7 @@ use model::record::rows::Bursts;
 use crate::fit::before_filter;
 use crate::fit::channel::{Form, Joint, Levels, State, Term, VarianceFound};
 use crate::fit::estimate;
-use crate::fit::likelihood::least_walk;
+use crate::fit::likelihood::{Bins, Noise, least_walk};
 use crate::search::searched::Searched;
 
 use climb::{Peak, climb};
@@ -260,19 +260,57 @@ fn coordinates(t: &Term) -> &[f64] {
 
 /// The noise of a state whose white variance is the same throughout.
 pub(crate) fn levels_of(s: &Searched<'_>, state: &State) -> Levels {
-    let n = s.search.panel.bins.n as f64;
     let errors = estimate::noise_errors(&s.search.panel, state);
+    let error = errors.first().copied().unwrap_or(f64::NAN);
+    let wider = state.wider.first().unwrap_or(&1.0);
+    let (scale, walk) = beside_walk(&s.search.panel.bins, state, error);
+    let plain = state.noise.terms.is_empty();
     // What is before a filter has an error of its own beside this one.
-    let white_error = match state.noise.terms.is_empty() || state.noise.filter().is_some() {
-        true => (2.0 / n).sqrt() * state.wider.first().unwrap_or(&1.0),
+    let white_error = match plain || state.noise.filter().is_some() {
+        true => scale * wider,
         false => before_filter::of_white(&s.search.panel, state),
     };
     Levels {
         white: state.solution.white,
         white_error,
         log_walk: state.noise.log_walk,
-        walk_error: errors.first().copied().unwrap_or(f64::NAN) / 2.0,
+        walk_error: 0.5 * if plain { walk } else { error },
     }
+}
+
+/// Standard errors of ln N^2 and ln K^2 of white noise and a random walk, by that of the logarithm of their ratio q. At a known q
+/// either has 2 / n; with q the white level falls by the share r of the walk in the density, in the mean over the spectrum, and
+/// the walk's rises by what is left. A walk that makes most of the spectrum has q by the information n var(r) / 2: the likelihood of
+/// what it hides is flat on one side.
+fn beside_walk(bins: &Bins, state: &State, error: f64) -> (f64, f64) {
+    let n = bins.n as f64;
+    let walk = state.noise.log_walk.exp();
+    let white = Noise {
+        log_walk: f64::NEG_INFINITY,
+        ..state.noise.clone()
+    };
+    let all = state.noise.over(bins);
+    let still = white.over(bins);
+    let share = |(all, still): (&f64, &f64)| 1.0 - still / all;
+    let mean_of = |of: &dyn Fn(f64) -> f64| {
+        let shares = all.iter().zip(&still).map(share);
+        let sum: f64 = shares.zip(bins.counts()).map(|(r, m)| m * of(r)).sum();
+        sum / bins.counts().iter().sum::<f64>()
+    };
+    let mean = mean_of(&|r| r);
+    let variance = mean_of(&|r| (r - mean) * (r - mean));
+    let ratio = if walk > 0.0 && mean > 0.5 {
+        (2.0 / (n * variance)).sqrt()
+    } else {
+        error
+    };
+    let at_known = (2.0 / n).sqrt();
+    // Of a walk too small to have an error the white level knows nothing.
+    let of_white = if ratio.is_finite() { mean * ratio } else { 0.0 };
+    (
+        at_known.hypot(of_white),
+        at_known.hypot((1.0 - mean) * ratio),
+    )
 }
 
 /// Mean of the white variance over that at the zero of its laws.

@@ -88,10 +88,14 @@ impl Jumps {
         let (places, known): (Vec<usize>, Vec<f64>) = (y.iter().copied().enumerate())
             .filter(|(_, v)| v.is_finite())
             .unzip();
+        // A random walk has gone farther after more readings.
+        let apart: Vec<f64> = (1..=ON_THE_WAY + 1)
+            .map(|gap| APART * change(&known, gap).max(2f64.sqrt() * sigma))
+            .collect();
         let mut found = Self::default();
         let mut from = 0;
         for k in FEWEST..known.len().saturating_sub(FEWEST) {
-            let Some((gap, height)) = between(&known, from, k, sigma) else {
+            let Some((gap, height)) = between(&known, from, k, (sigma, &apart)) else {
                 continue;
             };
             let at = places[k];
@@ -170,12 +174,23 @@ impl Jumps {
     }
 }
 
+/// Standard deviation of the change over so many readings, by the median of its size: jumps do not move it.
+fn change(known: &[f64], gap: usize) -> f64 {
+    let pairs = known.iter().zip(known.iter().skip(gap));
+    let sizes: Vec<f64> = pairs.map(|(a, b)| (b - a).abs()).collect();
+    median(&sizes) / tails::MEDIAN.sqrt()
+}
+
 /// How many readings before the one at `k` of all that are `known` the level was another, and how far off it was; `from` is where that
-/// level begins.
-fn between(known: &[f64], from: usize, k: usize, sigma: f64) -> Option<(usize, f64)> {
-    let change = |gap: usize| (known[k] - known[k - gap]).abs();
-    (1..=ON_THE_WAY + 1).find_map(|gap| {
-        if k < from + gap + FEWEST - 1 || change(gap) < APART * 2f64.sqrt() * sigma {
+/// level begins, and `apart` how far two readings lie at least for it, by how many they are apart.
+fn between(
+    known: &[f64],
+    from: usize,
+    k: usize,
+    (sigma, apart): (f64, &[f64]),
+) -> Option<(usize, f64)> {
+    (1..).zip(apart).find_map(|(gap, least)| {
+        if k < from + gap + FEWEST - 1 || (known[k] - known[k - gap]).abs() < *least {
             return None;
         }
         let last = k - gap;
