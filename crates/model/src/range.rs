@@ -34,6 +34,8 @@ pub(crate) const SIZE: Range = range(0.0, LARGEST);
 pub(crate) const STEP: Range = range(1e-100, LARGEST);
 /// Of the correlation of two axes, each of which has noise of its own.
 pub(crate) const CORRELATION: Range = range(-0.999, 0.999);
+/// Of what comes again over what was there before.
+pub(crate) const WEIGHT: Range = range(-1.0, 1.0);
 /// Of moments of a distribution that a noise may have ([`crate::simulate`] has one for each of these).
 pub(crate) const SKEWNESS: Range = range(SKEWNESS_LIMITS[0], SKEWNESS_LIMITS[1]);
 pub(crate) const EXCESS_KURTOSIS: Range =

@@ -105,7 +105,7 @@ impl Domain {
         const LAG: &[ColumnSpec] = &[
             column("lag", Some("s"), range::POSITIVE),
             column("size", Some("deg/s"), range::SIZE),
-            column("weight", Some("1"), range::CORRELATION),
+            column("weight", Some("1"), range::WEIGHT),
         ];
         const CODES: &[ColumnSpec] = &[
             column("skewness", Some("1"), range::SKEWNESS),

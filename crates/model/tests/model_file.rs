@@ -30,6 +30,7 @@ fn full() -> ModelFile {
             let columns = domain.columns(follows.is_some()).iter();
             let values = match domain {
                 Domain::Cross | Domain::Codes => vec![0.125],
+                Domain::Lag => vec![0.5, 1.0],
                 _ => vec![0.5, 2.0, 4.0],
             };
             let column = |c: &model::unnamed::ColumnSpec| {

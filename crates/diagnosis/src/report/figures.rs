@@ -200,7 +200,7 @@ pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
         let same = a.effect.id() == b.effect.id() && over(a) == over(b);
         std::ptr::eq(a, b) || same && over(a).is_some() && is_course(a) && is_course(b)
     };
-    let mut all = without_a_name::of_combinations(s, grid);
+    let mut all = without_a_name::all(s, grid);
     for (i, term) in named.iter().enumerate() {
         if named[..i].iter().any(|before| together(before, term)) {
             continue;
