@@ -144,11 +144,22 @@ fn of_student(cells: &[(f64, f64)], degrees: f64) -> f64 {
     sum(cells, density)
 }
 
+/// The same of the best of Student's laws.
+fn of_any_student(cells: &[(f64, f64)]) -> f64 {
+    let all = DEGREES.iter().map(|d| of_student(cells, *d));
+    all.fold(f64::NEG_INFINITY, f64::max)
+}
+
 /// Whether readings beyond `limit` are wild ones in normal noise.
 fn stand_apart(cells: &[(f64, f64)], limit: f64) -> bool {
-    let tails = DEGREES.iter().map(|d| of_student(cells, *d));
-    let rival = tails.fold(of_mixture(cells), f64::max);
+    let rival = of_any_student(cells).max(of_mixture(cells));
     with_wild(cells, limit) > rival + AHEAD
+}
+
+/// Whether readings beyond `limit` are the tails of the noise that all of them have: `sizes` in standard deviations.
+pub(crate) fn are_tails(sizes: impl Iterator<Item = f64>, limit: f64) -> bool {
+    let cells = histogram(sizes);
+    of_any_student(&cells) > with_wild(&cells, limit).max(of_mixture(&cells)) + AHEAD
 }
 
 /// Distance from which on readings are wild in normal noise, where there are some nearer than a single one would have to be.

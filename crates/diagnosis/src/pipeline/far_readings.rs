@@ -2,7 +2,8 @@
 //!
 //! Before the search a reading is held against white noise and a random walk. What follows a recorded signal may be farther off
 //! than these reach: the first readings of a surge behind a step of the motor are its largest. Set aside they are missing where
-//! the size of it is told best, so those that the model explains come back. And readings that are no farther off than noise
+//! the size of it is told best, so those that the model explains come back; so do the tails of a noise that Student's law
+//! describes better than a normal one with a group apart. And readings that are no farther off than noise
 //! reaches now and then, but too many, are set aside where nothing else makes them.
 
 use std::collections::BTreeMap;
@@ -35,7 +36,7 @@ pub(super) fn settle(grid: &mut Grid, audited: &Audit, singles: &BTreeMap<String
     }
 }
 
-/// Single far readings of a channel that lie within the noise of what a search finds there.
+/// Single far readings of a channel that lie within the noise of what a search finds there, or are the tails of that noise.
 fn explained(
     grid: &Grid,
     channel: usize,
@@ -49,11 +50,15 @@ fn explained(
         return vec![];
     }
     let s = channel::searched(grid, target);
-    if s.state.terms.is_empty() {
-        return vec![];
-    }
-    let each = target.aside.iter().zip(sizes_aside(&s, target));
-    each.filter(|((at, _), size)| far(at) && size.abs() < single)
+    let sizes = sizes_aside(&s, target);
+    let mut read = vec![true; s.e.len()];
+    target.lost.iter().for_each(|i| read[*i] = false);
+    let own = s.e.iter().zip(read).filter(|(_, read)| *read);
+    let all = own.map(|(e, _)| *e).chain(sizes.iter().copied());
+    let tails = wild::are_tails(all, single);
+    let found = !s.state.terms.is_empty();
+    let each = target.aside.iter().zip(sizes);
+    each.filter(|((at, _), size)| far(at) && (tails || found && size.abs() < single))
         .map(|((at, _), _)| *at)
         .collect()
 }
