@@ -92,8 +92,7 @@ impl Flicker {
 
 #[test]
 fn flicker_is_told_alone_with_its_size_and_simulated_as_the_record_has_it() {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
         let flicker = Flicker::drawn(&mut rng);

@@ -247,8 +247,7 @@ impl Lagging {
 
 #[test]
 fn a_bias_behind_or_ahead_of_its_thermometer_is_one_entry_with_its_slope_and_its_lag() {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_129);
+    let seed = draws::seed(20_261_129);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
         let drawn = Draw::drawn(&mut rng);

@@ -215,8 +215,7 @@ fn noise_draw(rng: &mut Xoshiro256PlusPlus) -> Result<(), String> {
 }
 
 fn graded(of: u64, draw: impl Fn(&mut Xoshiro256PlusPlus) -> Result<(), String>) {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     let told = draws::graded(RUNS, LEAST, |i| {
         // Of its own, whatever a diagnosis asks for.
         let own = seed.wrapping_mul(1000) + 100 * of + i;

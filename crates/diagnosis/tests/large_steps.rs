@@ -129,8 +129,7 @@ fn wrong(p: &Planted, d: &Diagnosis) -> Result<(), String> {
 }
 
 fn graded(of: u64, sizes: (f64, f64), count: usize) {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of);
     let told = draws::graded(RUNS, LEAST, |_| {
         let p = planted(&mut rng, sizes, count);

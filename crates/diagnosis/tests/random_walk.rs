@@ -24,8 +24,7 @@ const WIDEST: f64 = 3.0;
 
 #[test]
 fn a_walk_that_makes_most_of_the_noise_is_no_cause_and_has_its_intervals() {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_130);
+    let seed = draws::seed(20_261_130);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
         let decades = Uniform::new(RATIO.0, RATIO.1).expect("a range");

@@ -163,8 +163,7 @@ fn wrong(log: &Log, d: &Diagnosis) -> Result<(), String> {
 
 #[test]
 fn a_log_that_was_put_on_even_times_is_one_entry_with_the_rate_at_which_its_readings_came() {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
         let log = Log::drawn(&mut rng);

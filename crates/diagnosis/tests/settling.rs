@@ -105,8 +105,7 @@ impl Settling {
 
 #[test]
 fn a_bias_that_settles_in_a_second_or_in_minutes_is_one_warm_up_with_its_size_and_time() {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let told = draws::graded(RUNS, LEAST, |_| {
         let settling = Settling::drawn(&mut rng);

@@ -22,8 +22,7 @@ const SECONDS: f64 = 600.0;
 const SIGMA: f64 = 0.393;
 
 fn draws(of: u64) -> Xoshiro256PlusPlus {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_124);
+    let seed = draws::seed(20_261_124);
     println!("seed {seed}");
     Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
 }

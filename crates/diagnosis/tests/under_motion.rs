@@ -35,8 +35,7 @@ fn noise(rng: &mut Rng, sigma: f64) -> Vec<f64> {
 }
 
 fn rng(of: u64) -> Rng {
-    let seed = std::env::var("IMU_STAND_SEED");
-    let seed: u64 = seed.ok().and_then(|s| s.parse().ok()).unwrap_or(20_261_128);
+    let seed = draws::seed(20_261_128);
     Rng::seed_from_u64(seed.wrapping_mul(1000) + of)
 }
 

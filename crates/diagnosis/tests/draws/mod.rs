@@ -15,6 +15,12 @@ pub fn all() -> bool {
     std::env::var_os("IMU_STAND_ALL_DRAWS").is_some()
 }
 
+/// The seed of the draws of a test: its own, or that of `IMU_STAND_SEED`.
+pub fn seed(own: u64) -> u64 {
+    let asked = std::env::var("IMU_STAND_SEED").ok();
+    asked.and_then(|s| s.parse().ok()).unwrap_or(own)
+}
+
 /// One of two numbers: of a sample, and where all draws are asked for.
 pub fn of<T>(sample: T, every: T) -> T {
     if all() { every } else { sample }
