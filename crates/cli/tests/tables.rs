@@ -198,6 +198,7 @@ fn columns_of_text_and_angles_become_rates() {
     assert_eq!(gyro.unit, "deg/s");
     assert!((gyro.values[0] - turn).abs() < 1e-9 && gyro.values[1].is_nan());
     assert!((gyro.values[2] - 2.0 * turn).abs() < 1e-9 && gyro.values[4].is_nan());
+    std::fs::write(&path, "n a\n0 0\n1 1\n2 9\n3 11\n").unwrap();
     let error = read(&path, "gyro_z=a", "gyro=deg").unwrap_err();
     assert!(error.contains("time between its rows"), "{error}");
 }

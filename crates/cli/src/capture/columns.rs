@@ -5,18 +5,19 @@ use std::collections::BTreeMap;
 use model::record::Quantity;
 
 use super::assumed::{contradiction, note, whose};
-use super::build::{CORRECTED, OF_CORRECTION};
+use super::build::CORRECTED;
 use super::conventions::unit_of;
-use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
-use super::mapped::{UNASKED, beside_known, beside_ours, by_known_names, mapped, refuse_beside};
-use super::names::{
-    TIMES, in_its_place, left, meant, missing, not_read, other_clock, respelt, taken,
+use super::mapped::{
+    UNASKED, beside_known, beside_ours, by_known_names, mapped, refuse_beside, with_time,
 };
+use super::names::{TIMES, in_its_place, left, not_read, other_clock, respelt, taken};
+use super::own::{own, take_counted};
+use super::preamble::Stated;
 use super::propose::{stated_time, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
-use super::{CaptureError, ColumnMapping, STANDARD_GRAVITY};
+use super::{CaptureError, ColumnMapping};
 
 /// A column of the file: what it is here, and how its cells become values.
 pub(super) struct Column {
@@ -55,6 +56,10 @@ pub(super) struct Said<'a> {
     pub numbered: bool,
     /// Units that the file states.
     pub units: &'a [Option<String>],
+    /// Whether the sample rate is known without times.
+    pub knows_rate: bool,
+    /// Whether the file states it in words, which its times overrule.
+    pub states_rate: bool,
     /// Whether cells without a unit are measured values; else they are counts, and the header scales them.
     pub is_scaled: bool,
 }
@@ -69,6 +74,8 @@ pub(super) struct Columns {
     pub time_is_assumed: bool,
     /// Gyros of which nobody did.
     pub assumed_gyros: Vec<String>,
+    /// The rate that the file states in words.
+    pub stated_rate: Option<Stated>,
 }
 
 impl Columns {
@@ -134,7 +141,12 @@ fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
                     found.notes.push(taken(said, &all, &found));
                     found
                 }
-                None => mapped(said, mapping)?,
+                None => {
+                    let (mapping, note) = with_time(said, mapping)?;
+                    let mut found = mapped(said, &mapping)?;
+                    found.notes.extend(note);
+                    found
+                }
             },
         }
     } else if said.lines.get("format").is_some() {
@@ -209,7 +221,7 @@ fn is_measured(column: &Column) -> bool {
     matches!(column.role, Role::Measured { .. })
 }
 
-fn is_inertial(column: &Column) -> bool {
+pub(super) fn is_inertial(column: &Column) -> bool {
     matches!(
         column.role,
         Role::Measured {
@@ -256,11 +268,15 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     let is_scaled = said.is_scaled
         || inertial
             .any(|at| unit(at, What::Channel(meaning(stem(at)).0)).is_some_and(|u| u != COUNTS));
-    if !is_scaled {
-        return own(said, said.names, mapping);
-    }
+    // Where nothing says a unit, cells are counts, and so they are in columns of which the file says it.
+    let is_counted = |unit: Option<&str>| unit == Some(COUNTS) || (unit.is_none() && !is_scaled);
     let has = |name: &str| names.iter().any(|n| n == name);
     let has_time = TIMES.iter().any(|name| has(name)) || has("host_time_s") || has("t_ticks");
+    // `export` tells the board's time once more, in s.
+    let has_ticks =
+        mapping.columns.is_empty() && has("t_ticks") && said.lines.get("tick_s").is_some();
+    // It says the unit of every column.
+    let is_export = has("time_s") && said.names.iter().all(|n| said.lines.unit_of(n).is_some());
     let other_time = stated_time(said.names).filter(|_| !has_time);
     let mut found = Columns {
         notes,
@@ -276,28 +292,36 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
         let unit = unit(at, What::Channel(quantity));
         let role = match name {
             "seq" => Role::Seq,
-            "t_ticks" if said.lines.get("tick_s").is_some() => Role::Ticks,
+            "t_ticks" if !is_scaled || said.lines.get("tick_s").is_some() => {
+                said.lines.needed("tick_s", name)?;
+                Role::Ticks
+            }
             "flags" => Role::Flags,
             "host_time_s" => Role::Time { scale: 1.0 },
-            name if TIMES.contains(&name) && !has("host_time_s") && !found.has_time() => {
+            name if TIMES.contains(&name)
+                && !has_ticks
+                && !has("host_time_s")
+                && !found.has_time() =>
+            {
                 time(said, mapping, at, &mut found)?
             }
-            // The stand's own time, told once more in s by `export`.
+            name if TIMES.contains(&name) && has_ticks => continue,
             name if TIMES.contains(&name) && has("host_time_s") => {
-                let is_export = said.lines.get("format").is_some();
-                found
-                    .notes
-                    .extend((!is_export).then(|| other_clock(theirs)));
+                found.notes.push(other_clock(theirs));
                 continue;
             }
             _ if quantity == Quantity::Other => {
+                if let Some(unit) = said.lines.unit_of(theirs).filter(|_| is_export) {
+                    found.columns.push(exported(at, theirs, unit));
+                    continue;
+                }
                 match theirs.strip_prefix(UNASKED) {
                     Some(theirs) => found.notes.push(in_its_place(theirs)),
                     None => unread.push(theirs),
                 }
                 continue;
             }
-            _ if unit == Some(COUNTS) => {
+            _ if is_counted(unit) => {
                 counted.push((at, name.to_owned()));
                 continue;
             }
@@ -316,7 +340,8 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
         });
     }
     take_counted(&mut found, &counted, said, mapping)?;
-    if !found.columns.iter().any(is_inertial) {
+    let is_ours = |c: &Column| is_inertial(c) || (is_measured(c) && !c.is_asked);
+    if !found.columns.iter().any(is_ours) {
         return Err(unknown(said.names, NONE_OF_OURS.to_owned()));
     }
     found.assume(&assumed);
@@ -324,29 +349,28 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     Ok(found)
 }
 
-/// Takes columns of counts, by their places and names, as the header's keys scale them.
-fn take_counted(
-    found: &mut Columns,
-    counted: &[(usize, String)],
-    said: &Said<'_>,
-    mapping: &ColumnMapping,
-) -> Result<(), CaptureError> {
-    if counted.is_empty() {
-        return Ok(());
+/// A channel of its own, of which the header says the unit, as `export` writes it.
+fn exported(at: usize, name: &str, unit: &str) -> Column {
+    let quantity = match CORRECTED.contains(&name) {
+        true => Quantity::Derived,
+        false => Quantity::Other,
+    };
+    Column {
+        at,
+        name: name.to_owned(),
+        role: Role::Measured {
+            quantity,
+            unit: unit.to_owned(),
+            zero: 0.0,
+            scale: 1.0,
+            counts: false,
+        },
+        is_asked: false,
     }
-    let names: Vec<String> = counted.iter().map(|(_, name)| name.clone()).collect();
-    let own = own(said, &names, mapping)?;
-    found.notes.extend(own.notes);
-    found
-        .columns
-        .extend(own.columns.into_iter().map(|c| Column {
-            at: counted[c.at].0,
-            ..c
-        }));
-    Ok(())
 }
 
-const NONE_OF_OURS: &str = "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
+pub(super) const NONE_OF_OURS: &str =
+    "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
 
 /// The time column at a place, in the unit that is given, stated or usual.
 pub(super) fn time(
@@ -371,116 +395,4 @@ pub(super) fn time(
         ));
     }
     Ok(Role::Time { scale })
-}
-
-/// Columns of the stand's own format that are no channels.
-const OF_FRAMES: [&str; 4] = ["seq", "t_ticks", "host_time_s", "flags"];
-
-/// The columns of the stand's own format, by whose header they are scaled.
-fn own(
-    said: &Said<'_>,
-    names: &[String],
-    mapping: &ColumnMapping,
-) -> Result<Columns, CaptureError> {
-    let lines = said.lines;
-    let is_capture = lines.get("format").is_some();
-    let theirs = names;
-    let (names, mut notes) = respelt(theirs, &[], is_capture);
-    let (mut columns, mut unread) = (Vec::new(), Vec::new());
-    let missing = missing(&names);
-    for (at, name) in names.iter().enumerate() {
-        let (quantity, _) = meaning(name);
-        // What the board says of its correction is no measurement.
-        if is_capture && OF_CORRECTION.contains(&name.as_str()) {
-            continue;
-        }
-        let role = match role_of(name, lines, is_capture)? {
-            Some(role) => role,
-            // The format may grow: what is not known is kept as it is, where the file says that it is ours.
-            None if is_capture => {
-                notes.extend(misspelt(name, &missing));
-                let unit = mapping.unit(name, What::Channel(quantity)).unwrap_or("1");
-                Role::Measured {
-                    quantity,
-                    unit: unit.to_owned(),
-                    zero: 0.0,
-                    scale: 1.0,
-                    counts: false,
-                }
-            }
-            None => {
-                unread.push(&theirs[at]);
-                continue;
-            }
-        };
-        columns.push(Column {
-            at,
-            name: name.clone(),
-            role,
-            is_asked: quantity != Quantity::Other || OF_FRAMES.contains(&name.as_str()),
-        });
-    }
-    if !columns.iter().any(is_inertial) {
-        return Err(unknown(said.names, NONE_OF_OURS.to_owned()));
-    }
-    notes.extend(not_read(&unread, &names));
-    Ok(Columns {
-        columns,
-        notes,
-        ..Columns::default()
-    })
-}
-
-/// What a column of our names is, by the header's keys; `None` for a name that the format does not have.
-fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, CaptureError> {
-    let (quantity, _) = meaning(name);
-    let scaled = |zero, scale, unit: &str| Role::Measured {
-        quantity,
-        unit: unit.to_owned(),
-        zero,
-        scale,
-        counts: true,
-    };
-    Ok(Some(match (name, quantity) {
-        ("seq", _) => Role::Seq,
-        ("t_ticks", _) => {
-            lines.needed("tick_s", name)?;
-            Role::Ticks
-        }
-        ("host_time_s", _) => Role::Time { scale: 1.0 },
-        ("flags", _) => Role::Flags,
-        (_, Quantity::Gyro) => scaled(0.0, lines.scale("gyro_lsb_dps", name)?, "deg/s"),
-        (_, Quantity::Temp) => {
-            let lsb = lines.scale("temp_lsb_c", name)?;
-            scaled(-lines.needed("temp_zero_c", name)? / lsb, lsb, "degC")
-        }
-        (_, Quantity::Supply) => scaled(0.0, lines.scale("supply_lsb_v", name)?, "V"),
-        (_, Quantity::Acc) => {
-            let per_g = lines.scale("acc_counts_per_g", name)?;
-            scaled(
-                lines.needed("acc_zero_counts", name)?,
-                STANDARD_GRAVITY / per_g,
-                "m/s^2",
-            )
-        }
-        (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
-        (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
-            quantity: Quantity::Derived,
-            unit: "deg/s".to_owned(),
-            zero: 0.0,
-            scale: lines.scale("corrected_lsb_dps", name)?,
-            counts: false,
-        },
-        (_, Quantity::Other | Quantity::Derived) => return Ok(None),
-    }))
-}
-
-/// What to tell of a column that is none of the format's, where its name is near one that is missing.
-fn misspelt(name: &str, missing: &[&'static str]) -> Option<String> {
-    let ours = meant(name, missing)?;
-    Some(format!(
-        "column `{}` is none of the format's, so it is a channel of its own, which no cause knows: did you mean `{ours}`? \
-         Then rename it in the line of the names",
-        brief(name)
-    ))
 }

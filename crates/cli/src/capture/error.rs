@@ -159,6 +159,24 @@ pub enum CaptureError {
         /// What is wrong with it.
         expected: String,
     },
+    /// A number that may be read in two ways.
+    #[error("line {line}, column `{column}`: `{found}` is no number for sure: {why}")]
+    #[diagnostic(
+        code(capture::ambiguous_number),
+        help(
+            "write the table without separators of thousands, and with one sign before all fractions"
+        )
+    )]
+    Ambiguous {
+        /// Where.
+        line: u64,
+        /// Which column.
+        column: String,
+        /// What stands there.
+        found: String,
+        /// What it may be.
+        why: &'static str,
+    },
     /// A row of another width than its table.
     #[error("line {line} has {found} cells, and the table has {expected} columns")]
     #[diagnostic(

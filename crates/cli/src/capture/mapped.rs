@@ -5,11 +5,11 @@ use model::record::Quantity;
 use super::assumed::contradiction;
 use super::columns::{Column, Columns, Role, Said, measured, time};
 use super::conventions::unit_of;
-use super::error::brief;
+use super::error::{brief, brief_list};
 use super::foreign::meaning;
 use super::names::TIMES;
 use super::propose::seen::Seen;
-use super::propose::{alias, guess, nearest, unknown};
+use super::propose::{alias, guess, nearest, times, unknown};
 use super::units::{What, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
@@ -76,6 +76,59 @@ pub(super) fn refuse_beside(said: &Said<'_>, mapping: &ColumnMapping) -> Result<
         help: "leave it out: all of them are read; to read the cells of a gyro as other values, map it: `--columns gyro_x=gyro_x`"
             .to_owned(),
     })
+}
+
+/// The mapping with the column of the time, where it names none, nothing says the rate, and one column alone calls itself a time;
+/// and what to say of it.
+///
+/// # Errors
+/// [`CaptureError::Option`] where several do.
+pub(super) fn with_time(
+    said: &Said<'_>,
+    mapping: &ColumnMapping,
+) -> Result<(ColumnMapping, Option<String>), CaptureError> {
+    let mut all = mapping.clone();
+    let is_time = |(given, _): &(String, String)| {
+        let ours = alias(given).unwrap_or_else(|| given.clone());
+        matches!(ours.as_str(), "time" | "host_time_s")
+    };
+    if said.knows_rate || said.numbered || mapping.columns.iter().any(is_time) {
+        return Ok((all, None));
+    }
+    let given: Vec<Option<usize>> = (mapping.columns.iter())
+        .map(|(_, theirs)| place(said, theirs))
+        .collect();
+    // What is not there is told by who reads the mapping.
+    if given.contains(&None) {
+        return Ok((all, None));
+    }
+    let mut times = times(said.names);
+    times.retain(|at| !given.contains(&Some(*at)));
+    let name = |at: &usize| brief(&said.names[*at]);
+    match times[..] {
+        [] => Ok((all, None)),
+        [at] => {
+            all.columns
+                .insert(0, ("time".to_owned(), (at + 1).to_string()));
+            let name = name(&at);
+            let note = format!(
+                "the times are those of `{name}`, as `--columns` names no time; `time=...` or `--rate` says otherwise"
+            );
+            Ok((all, Some(note)))
+        }
+        _ if said.states_rate => Ok((all, None)),
+        _ => Err(CaptureError::Option {
+            option: "--columns",
+            why: format!(
+                "it names no time, and several columns may be it: {}",
+                brief_list(&times.iter().map(name).collect::<Vec<_>>()).join(", ")
+            ),
+            help: format!(
+                "add the right one, `time={}` for example; or say `--rate HZ` where none is",
+                name(&times[0])
+            ),
+        }),
+    }
 }
 
 /// Whether a name is that of a gyro or an accelerometer.

@@ -3,6 +3,7 @@
 mod angle;
 mod assumed;
 mod build;
+mod cells;
 #[cfg(feature = "native")]
 mod codecs;
 mod columns;
@@ -23,9 +24,11 @@ mod logs;
 mod mapped;
 mod names;
 mod order;
+mod own;
 #[cfg(feature = "native")]
 mod pages;
 mod plausible;
+mod preamble;
 mod propose;
 mod read;
 mod rows;

@@ -214,7 +214,7 @@ fn by_unit(step: f64) -> String {
 }
 
 /// Deviation of a rate given from that of the times beyond which one of them is wrong: no clock is, by as much.
-const CONTRADICTS: f64 = 0.05;
+pub(super) const CONTRADICTS: f64 = 0.05;
 
 /// An error where a rate was given for rows whose times say another one.
 pub(super) fn check_rate(record: &mut Record, given: Option<f64>) -> Result<(), CaptureError> {

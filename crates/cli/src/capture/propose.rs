@@ -294,6 +294,21 @@ pub(super) fn stated_time(names: &[String]) -> Option<usize> {
     all.next().filter(|_| all.next().is_none())
 }
 
+/// The places of the columns whose names say that they are times; of dates, where there is none.
+pub(super) fn times(names: &[String]) -> Vec<usize> {
+    let meanings = meanings(names);
+    let of = |kind: Kind| {
+        let is_it = |at: &usize| meanings[*at].kind == kind || names[*at] == "host_time_s";
+        (0..names.len()).filter(is_it).collect::<Vec<_>>()
+    };
+    let times = of(Kind::Time);
+    if times.is_empty() {
+        of(Kind::Date)
+    } else {
+        times
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Time,

@@ -16,6 +16,7 @@ use super::layout::{Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
 use super::plausible::{doubts, in_range};
+use super::preamble::{stated, stated_by};
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
@@ -108,12 +109,18 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         return Err(CaptureError::Empty);
     }
     let mut header = layout.lines.header()?;
+    let in_words = match header.rate_hz {
+        Some(_) => Ok(None),
+        None => stated(&layout.said),
+    };
     header.rate_hz = options.rate_hz.or(header.rate_hz);
     let said = Said {
         lines: &layout.lines,
         names: &layout.names,
         numbered: layout.numbered,
         units: &layout.units,
+        knows_rate: header.rate_hz.is_some(),
+        states_rate: matches!(in_words, Ok(Some(_))),
         is_scaled: false,
     };
     let mut found = match columns(&said, &options.mapping) {
@@ -128,7 +135,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 error,
                 &said,
                 &options.mapping,
-                header.rate_hz.is_some(),
+                said.knows_rate || said.states_rate,
                 &seen,
             ));
         }
@@ -137,10 +144,11 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     found.ask()?;
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
-            "the table begins in line {}: what stands before, from line {first} on, is not read",
+            "the table begins in line {}: what stands before, from line {first} on, is no part of it",
             last + 1
         ));
     }
+    found.keep_rate(in_words, options.rate_hz);
     let mut values: Vec<Vec<f64>> = found.columns.iter().map(|_| Vec::new()).collect();
     let mut reader = RowReader::new(&found.columns, &layout.names, layout.cells);
     let (mut skipped, mut again) = (Vec::new(), Vec::new());
@@ -153,13 +161,17 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 .zip(&reader.values)
                 .for_each(|(column, &value)| column.push(value)),
             Err(_) if reader.is_names(cells, said.names) => again.push(line),
+            // Such rows are the large readings.
+            Err(error @ CaptureError::Ambiguous { .. }) => return Err(error),
             Err(_) if options.skip_bad => skipped.push(values.first().map_or(0, Vec::len)),
             Err(error) => return Err(error),
         }
         row = next_row_into(&mut text, cells)?;
     }
     let odd = std::mem::take(&mut reader.odd);
+    let grouped = reader.grouped();
     reader.sensors.take().map_or(Ok(()), Sensors::one)?;
+    found.notes.extend(grouped);
     if let Some(first) = again.first() {
         found.notes.push(format!(
             "the names of the columns stand again {} x, first in line {first}, as where files were put end to end: the rows are read on",
@@ -205,6 +217,10 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
             .map(|(i, (key, value))| (i + 1, key.clone(), value.clone())),
     );
     let mut header = lines.header()?;
+    let in_words = match header.rate_hz {
+        Some(_) => Ok(None),
+        None => stated_by(&lines),
+    };
     header.rate_hz = options.rate_hz.or(header.rate_hz);
     let stated = |name: &String| lines.unit_of(name).map(str::to_owned);
     let units: Vec<Option<String>> = table.names.iter().map(stated).collect();
@@ -213,6 +229,8 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
         names: &table.names,
         numbered: false,
         units: &units,
+        knows_rate: header.rate_hz.is_some(),
+        states_rate: matches!(in_words, Ok(Some(_))),
         is_scaled: true,
     };
     let mut found = columns(&said, &options.mapping).map_err(|error| {
@@ -222,7 +240,7 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
             error,
             &said,
             &options.mapping,
-            header.rate_hz.is_some(),
+            said.knows_rate || said.states_rate,
             &seen,
         )
     })?;
@@ -230,6 +248,7 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
         found.ask()?;
     }
     found.notes.splice(..0, table.notes);
+    found.keep_rate(in_words, options.rate_hz);
     let mut cells = Vec::new();
     for column in &found.columns {
         let mut values = table.columns[column.at].clone();
@@ -288,6 +307,11 @@ fn finish(
         );
         record.notes.push(note);
     }
+    let in_words = found.stated_rate.take();
+    let has_times = record.host_time_s.is_some() || record.t_ticks.is_some();
+    if let (Some(in_words), false) = (&in_words, has_times) {
+        in_words.take(&mut record, options.rate_hz);
+    }
     let stated = record.header.rate_hz;
     let mut record = in_order(record);
     if let Some(times) = &record.host_time_s {
@@ -305,6 +329,9 @@ fn finish(
         record.notes.extend(note);
     }
     check_rate(&mut record, options.rate_hz)?;
+    if let (Some(in_words), true) = (&in_words, has_times) {
+        in_words.hold_against(&mut record);
+    }
     difference_angles(&mut record)?;
     share_thermometer(&mut record);
     if let Cow::Owned(kept) = fills::left_out(Cow::Borrowed(&record)) {

@@ -1,9 +1,9 @@
 //! Rows of a text.
 
 use super::CaptureError;
+use super::cells::Cells;
 use super::columns::{Column, Role};
 use super::error::brief;
-use super::layout::Cells;
 use super::several::Sensors;
 use super::time::Clock;
 
@@ -59,6 +59,14 @@ impl<'a> RowReader<'a> {
             odd: vec![None; columns.len()],
             sensors: Sensors::of(names, columns),
         }
+    }
+
+    /// Says how numbers in groups are read, where there are any.
+    pub fn grouped(&self) -> Option<String> {
+        let first = self.cells.grouped.as_ref()?;
+        Some(format!(
+            "thousands are taken to be set off in groups: {first}"
+        ))
     }
 
     /// Whether a line has the columns' names once more, as where files were put end to end.
@@ -137,6 +145,14 @@ impl<'a> RowReader<'a> {
                 continue;
             }
             let Some(value) = read else {
+                if let Some(why) = self.cells.why_not(cell) {
+                    return Err(CaptureError::Ambiguous {
+                        line,
+                        column: brief(&column.name),
+                        found: brief(cell),
+                        why,
+                    });
+                }
                 if matches!(column.role, Role::Time { .. }) {
                     return Err(CaptureError::Time {
                         why: format!("line {line}, column `{}`: `{}` is no time", brief(&column.name), brief(cell)),

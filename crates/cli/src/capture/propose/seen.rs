@@ -2,7 +2,8 @@
 
 use std::io::BufRead;
 
-use super::super::layout::{Cells, next_row};
+use super::super::cells::Cells;
+use super::super::layout::next_row;
 use super::super::stream::TextLines;
 use super::super::time::Clock;
 use super::super::{CaptureError, STANDARD_GRAVITY};
