@@ -241,3 +241,143 @@ fn thousands_are_read_where_they_can_be_nothing_else_and_refused_where_they_may_
     let told = refusal(&mixed, "", "gyro=deg/s");
     assert!(told.contains("numbers before it have a point"), "{told}");
 }
+
+#[test]
+fn a_list_of_names_behind_a_label_or_in_a_format_of_printf_is_one() {
+    let body = rows(40, &|k| {
+        format!("{},{},0.99", 90_198 + 9_087 * k, 0.001 * (k % 7) as f64)
+    });
+    let head = " # Data format: \"%int(ChipTimeUS),%float(RawGyroX),%float(RawAccelZ)\"\r\n";
+    let told = refusal(&format!("{head}{body}"), "", "");
+    assert!(
+        told.contains(
+            "--columns time=ChipTimeUS,gyro_x=RawGyroX,acc_z=RawAccelZ --units time=us,gyro=UNIT"
+        ),
+        "{told}"
+    );
+    let (record, _) = notes(
+        &format!("{head}{body}"),
+        "time=ChipTimeUS,gyro_x=RawGyroX",
+        "gyro=rad/s",
+    );
+    assert!((middle_step(&record) - 9.087e-3).abs() < 1e-9);
+    let (record, _) = notes(
+        &format!("#Fields: time_us,gyro_x,acc_z\n{body}"),
+        "",
+        "gyro=rad/s,acc=g",
+    );
+    assert!((middle_step(&record) - 9.087e-3).abs() < 1e-9);
+    // Behind the last name, nothing is no column.
+    let told = refusal(
+        &format!("n;Gyr_X;Gyr_Y;\n{}", rows(9, &|k| format!("{k};1;2;"))),
+        "",
+        "",
+    );
+    assert!(
+        told.contains("Gyr_Y; map") || told.contains("Gyr_Y;"),
+        "{told}"
+    );
+}
+
+#[test]
+fn each_column_has_the_unit_that_its_own_name_says() {
+    let body = rows(40, &|k| {
+        format!("{:.2},{},{}", 0.01 * k as f64, 1 + k % 2, 1 + k % 2)
+    });
+    let (record, said) = notes(&format!("t[s],wx[rad/s],wy[deg/s]\n{body}"), "", "");
+    let first = |name: &str| record.channel(name).expect(name).values[0];
+    assert!((first("gyro_x") - 57.295_779_513).abs() < 1e-6 && first("gyro_y") == 1.0);
+    assert!(
+        said.contains("gyro_y in deg/s") && !said.contains("although"),
+        "{said}"
+    );
+    // What is said by hand is so for all.
+    let (record, _) = notes(
+        &format!("t[s],wx[rad/s],wy[deg/s]\n{body}"),
+        "",
+        "gyro=deg/s",
+    );
+    assert_eq!(record.channel("gyro_x").expect("x").values[0], 1.0);
+    // Increments of an angle are not differenced once more.
+    let text = format!("time_s,dtheta_x [deg],dtheta_y [deg]\n{body}");
+    for columns in ["", "time=time_s,gyro_x=dtheta_x"] {
+        let told = refusal(&text, columns, "");
+        assert!(
+            told.contains("increments of an angle") && told.contains("gyro_x=100deg/s"),
+            "{told}"
+        );
+    }
+    let (record, _) = notes(&text, "time=time_s,gyro_x=dtheta_x", "gyro=100deg/s");
+    assert_eq!(record.channels[0].values[0], 100.0);
+}
+
+#[test]
+fn times_and_rates_are_known_in_other_languages_and_two_sensors_by_their_numbers() {
+    let body = rows(40, &|k| {
+        format!("{:.2};{};{};25", 0.01 * k as f64, k % 7, k % 5)
+    });
+    for names in [
+        "Temps (s);Vitesse angulaire X (°/s);Vitesse angulaire Y (°/s);Température (°C)",
+        "Zeit [s];Drehrate X [°/s];Drehrate Y [°/s];Temperatur [°C]",
+        "時刻[s];角速度X[deg/s];角速度Y[deg/s];温度[℃]",
+    ] {
+        let (record, said) = notes(&format!("{names}\n{body}"), "", "");
+        assert!((middle_step(&record) - 0.01).abs() < 1e-9, "{said}");
+        assert_eq!(
+            record.channel("gyro_y").expect("y").values[3],
+            3.0,
+            "{said}"
+        );
+        assert_eq!(
+            record.channel("temp").expect("temp").values[3],
+            25.0,
+            "{said}"
+        );
+    }
+    let two = format!("time_s;gyro_x_1 (dps);gyro_x_2 (dps);gyro_y_1 (dps)\n{body}");
+    let told = refusal(&two, "", "");
+    assert!(
+        told.contains("gyro_x=gyro_x_1 (dps),gyro_y=gyro_y_1 (dps)"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_first_row_without_readings_is_a_row_and_a_comment_may_begin_with_slashes() {
+    let body = rows(40, &|k| {
+        format!("{:.2},{},{}", 0.01 * k as f64, k % 7, k % 5)
+    });
+    let text = format!("time_s,gyro_x [deg/s],gyro_y [deg/s]\n-0.01,NaN,\n{body}// end\n");
+    let (record, _) = notes(&text, "", "");
+    assert_eq!(record.len(), 41);
+    assert!(record.channels[0].values[0].is_nan());
+}
+
+#[test]
+fn an_imu_of_ardupilots_logs_is_read_from_the_converters_csv_and_two_are_refused() {
+    let row = |k: usize, imu: usize| {
+        format!(
+            "1574187013.{:02},{},{imu},0.0{},0.01,0.02,0.1,0.2,-9.8,0,0,45.5",
+            k,
+            12_000_000 + 10_000 * k + imu,
+            k % 7
+        )
+    };
+    let head = "timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T";
+    let (record, said) = notes(&format!("{head}\n{}", rows(60, &|k| row(k, 0))), "", "");
+    assert!((middle_step(&record) - 0.01).abs() < 1e-9, "{said}");
+    let gyro = &record.channel("gyro_z").expect("z").values;
+    assert!((gyro[0] - 0.02f64.to_degrees()).abs() < 1e-9, "{said}");
+    let told = refusal(
+        &format!("{head}\n{}", rows(60, &|k| row(k / 2, k % 2))),
+        "",
+        "",
+    );
+    assert!(told.contains("several sensors: column `I`"), "{told}");
+    let text = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nIMU, 1, 0, 0.1\n";
+    let told = refusal(text, "", "");
+    assert!(
+        told.contains("ArduPilot") && told.contains("mavlogdump.py"),
+        "{told}"
+    );
+}

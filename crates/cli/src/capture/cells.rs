@@ -61,6 +61,12 @@ fn short_decimal(text: &[u8]) -> Option<(f64, usize, bool)> {
     Some((number, at, point.is_some()))
 }
 
+/// Whether a cell says that there is no reading: nothing, or what tables write for it.
+pub(super) fn is_missing(cell: &str) -> bool {
+    const WORDS: [&str; 7] = ["nan", "na", "n/a", "#n/a", "<na>", "null", "none"];
+    cell.is_empty() || WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word))
+}
+
 /// Cuts lines into cells, and reads numbers.
 pub(super) struct Cells {
     separator: char,
@@ -274,7 +280,7 @@ impl Cells {
         let cells = self.cut(line);
         let mut reader = Self::new(self.separator);
         let (mut numbers, mut all) = (0, 0);
-        for cell in cells.iter().filter(|cell| !cell.is_empty()) {
+        for cell in cells.iter().filter(|cell| !is_missing(cell)) {
             all += 1;
             let is_number = reader.number(cell).is_some() || reader.why_not(cell).is_some();
             numbers += usize::from(is_number || is_date(cell));

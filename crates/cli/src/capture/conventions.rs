@@ -20,12 +20,22 @@ const WRITERS: [(&str, &str); 8] = [
     ("a_rs_s", "m/s2"),
 ];
 
+/// The time of ArduPilot's logs.
+pub(super) const DATAFLASH: &str = "TimeUS";
+
 /// Columns by which a file's writer is known, and the units of others in it.
-const FILES: [(&str, &str, &str); 3] = [
+const FILES: [(&str, &str, &str); 9] = [
     // `rostopic echo -p` stamps in nanoseconds.
     ("field.angular_velocity.x", "time", "ns"),
     ("gyro_rad[0]", "timestamp", "us"),
     ("gyro_rad[0]", "timestamp_sample", "us"),
+    // ArduPilot's message IMU, as mavlogdump writes it.
+    (DATAFLASH, "gyrx", "rad/s"),
+    (DATAFLASH, "gyry", "rad/s"),
+    (DATAFLASH, "gyrz", "rad/s"),
+    (DATAFLASH, "accx", "m/s2"),
+    (DATAFLASH, "accy", "m/s2"),
+    (DATAFLASH, "accz", "m/s2"),
 ];
 
 /// The unit that a column's name says of what it is mapped to, beside the other columns of its file.
@@ -39,9 +49,9 @@ pub(super) fn unit_of(name: &str, what: What, names: &[String]) -> Option<&'stat
         let by_name = by_name.map(|(_, unit)| *unit);
         by_name.or_else(|| {
             let is_there = |mark: &str| names.iter().any(|name| name.eq_ignore_ascii_case(mark));
-            let by_file = FILES
-                .iter()
-                .find(|(mark, own, _)| small == *own && what == What::Time && is_there(mark));
+            let by_file = FILES.iter().find(|(mark, own, unit)| {
+                small == *own && is_unit_of(unit, what) && is_there(mark)
+            });
             // Systems of phones deliver rad/s, and the logger that names its seconds so leaves it at that.
             let is_phone = what == What::Channel(Quantity::Gyro) && is_there("seconds_elapsed");
             by_file
@@ -72,6 +82,9 @@ mod tests {
             ("field.header.stamp", What::Time, &ros, Some("ns")),
             ("timestamp", What::Time, &["gyro_rad[0]"], Some("us")),
             ("x", gyro, &["seconds_elapsed"], Some("rad/s")),
+            ("GyrX", gyro, &["TimeUS"], Some("rad/s")),
+            ("AccZ", acc, &["TimeUS"], Some("m/s2")),
+            ("GyrX", gyro, &none, None),
             // What a name does not say nobody knows.
             ("time", What::Time, &none, None),
             ("timestamp", What::Time, &none, None),

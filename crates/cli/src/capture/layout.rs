@@ -13,6 +13,9 @@ use super::units::{in_brackets, known};
 /// What separates cells, in the order in which it is looked for; the last stands for any blanks.
 const SEPARATORS: [char; 4] = [';', '\t', ',', ' '];
 
+/// How a comment begins for some.
+const SLASHES: &str = "//";
+
 /// A text up to its first row.
 pub(super) struct Layout {
     /// The `# key: value` lines.
@@ -48,9 +51,18 @@ impl Layout {
                 if comments.len() < PREAMBLE {
                     comments.push((number, line.clone()));
                 }
-                if !lines.take(number as usize, said) && !said.is_empty() {
-                    comment = said.to_owned();
+                let list = list_of_names(said);
+                if list.len() < said.len() || !lines.take(number as usize, said) && !said.is_empty()
+                {
+                    comment = list.to_owned();
                 }
+                text.is_no_row(&line)?;
+            } else if let Some(said) = line.strip_prefix(SLASHES) {
+                // Their keys are not ours.
+                if comments.len() < PREAMBLE {
+                    comments.push((number, line.clone()));
+                }
+                comment = list_of_names(said.trim()).to_owned();
                 text.is_no_row(&line)?;
             } else if let Some(said) = line.strip_prefix("sep=") {
                 // A spreadsheet's own line.
@@ -72,7 +84,7 @@ impl Layout {
             let named = cells.cut(&comment);
             let is_header = named.len() == width && !cells.is_row(&comment);
             let (names, numbered) = match width {
-                _ if is_header && width > 1 => (owned(&named), false),
+                _ if is_header && width > 1 => (names_of(&named), false),
                 1 => (vec!["values".to_owned()], true),
                 _ => ((1..=width).map(|k| format!("column_{k}")).collect(), true),
             };
@@ -83,8 +95,18 @@ impl Layout {
         let first = next_row(text)?;
         let row = first.as_ref().map_or("", |(_, row)| row.as_str());
         let (of_names, of_rows) = separators(&line, row, separator);
-        let names = owned(&Cells::new(of_names).cut(&line));
+        let mut names = names_of(&Cells::new(of_names).cut(list_of_names(&line)));
         cells = Cells::new(of_rows);
+        // A separator at the end of the names is no column where rows have nothing there.
+        let behind = cells.cut(row);
+        if names.len() > 1
+            && names.last().is_some_and(String::is_empty)
+            && behind
+                .get(names.len() - 1)
+                .is_none_or(|cell| cell.is_empty())
+        {
+            names.pop();
+        }
         let mut layout = Self::new(lines, names, false, cells, first);
         (layout.preamble, layout.said) = (preamble, comments);
         layout.take_units(text)?;
@@ -158,7 +180,7 @@ fn behind_preamble(
         let (names_cut, row_cut) = (Cells::new(of_names), Cells::new(of_rows));
         let width = row_cut.cut(row).len();
         width > 1
-            && names_cut.cut(names).len() == width
+            && are_as_wide(&names_cut.cut(names), &row_cut.cut(row))
             && !names_cut.is_row(names)
             && row_cut.is_row(row)
     };
@@ -197,10 +219,9 @@ fn behind_preamble(
 
 /// What separates names, and what separates the cells of rows: the first pair by which both have one width.
 fn separators(names: &str, row: &str, said: Option<char>) -> (char, char) {
-    let width = |line: &str, separator| Cells::new(separator).cut(line).len();
     let fits = |of_names, of_rows| {
-        let columns = width(names, of_names);
-        columns > 1 && columns == width(row, of_rows)
+        let columns = Cells::new(of_names).cut(names);
+        columns.len() > 1 && are_as_wide(&columns, &Cells::new(of_rows).cut(row))
     };
     let mut pairs = SEPARATORS
         .into_iter()
@@ -209,6 +230,47 @@ fn separators(names: &str, row: &str, said: Option<char>) -> (char, char) {
     said.map(|s| (s, s))
         .or_else(|| pairs.find(|(a, b)| fits(*a, *b)))
         .unwrap_or_else(|| fallback.map_or((',', ','), |s| (*s, *s)))
+}
+
+/// Whether names and the cells of a row are as many, but for nothing behind a last separator.
+fn are_as_wide(names: &[Cow<'_, str>], row: &[Cow<'_, str>]) -> bool {
+    let is_longer = |long: &[Cow<'_, str>], short: &[Cow<'_, str>]| {
+        long.len() == short.len() + 1 && long.last().is_some_and(|cell| cell.is_empty())
+    };
+    names.len() == row.len() || is_longer(names, row) || is_longer(row, names)
+}
+
+/// The list of names in a line that says so before it: `Data format: "..."`, `Fields: ...`.
+fn list_of_names(line: &str) -> &str {
+    const LABELS: [&str; 5] = ["format", "columns", "fields", "header", "names"];
+    let Some((label, list)) = line.split_once(':') else {
+        return line;
+    };
+    let label = label.trim_start_matches(['#', '%', '/']).to_lowercase();
+    let mut words = label.split_whitespace().rev();
+    let is_label = words.next().is_some_and(|word| LABELS.contains(&word)) && words.count() < 3;
+    let list = list.trim();
+    let is_list = list.contains(SEPARATORS);
+    let bare = list
+        .strip_prefix('"')
+        .and_then(|list| list.strip_suffix('"'));
+    match bare.filter(|bare| !bare.contains('"')) {
+        _ if !is_label || !is_list => line,
+        Some(bare) => bare,
+        None => list,
+    }
+}
+
+/// Names as they are, and what a format of `printf` has in brackets: `%float(RawGyroX)`.
+fn names_of(cells: &[Cow<'_, str>]) -> Vec<String> {
+    let bare = |cell: &Cow<'_, str>| {
+        let inner = cell
+            .strip_prefix('%')
+            .and_then(|format| format.strip_suffix(')'));
+        let inner = inner.and_then(|format| format.split_once('('));
+        inner.map_or_else(|| cell.to_string(), |(_, name)| name.to_owned())
+    };
+    cells.iter().map(bare).collect()
 }
 
 /// The next line that is neither empty nor a comment.
@@ -226,7 +288,7 @@ pub(super) fn next_row_into(
     line: &mut String,
 ) -> Result<Option<u64>, CaptureError> {
     while let Some(number) = text.next_line_into(line)? {
-        if !line.trim().is_empty() && !line.starts_with(['#', '%']) {
+        if !line.trim().is_empty() && !line.starts_with(['#', '%']) && !line.starts_with(SLASHES) {
             text.is_row();
             return Ok(Some(number));
         }

@@ -10,7 +10,7 @@ use super::foreign::meaning;
 use super::names::TIMES;
 use super::propose::seen::Seen;
 use super::propose::{alias, guess, nearest, times, unknown};
-use super::units::{What, in_brackets};
+use super::units::{What, in_brackets, is_angle, known};
 use super::{CaptureError, ColumnMapping};
 
 /// Begins the name of a column in whose place the mapping names another: a name that is none of ours in any spelling.
@@ -224,12 +224,32 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
             .find(|(ours, _)| ours.starts_with(key))
             .and_then(|(_, at)| said.units[*at].as_deref());
         let is_given = units.iter().any(|(known, _)| known == key);
+        let of_increments = (guess.columns.iter())
+            .any(|(ours, at)| ours.starts_with(key) && are_increments(&said.names[*at]));
         match (*of_name).or(of_column) {
             _ if is_given => {}
+            // What they are has to be said.
+            Some(unit) if *key == "gyro" && is_angle(unit) && of_increments => {}
             Some(unit) => units.push(((*key).to_owned(), unit.to_owned())),
             // Times without a unit are held against their steps.
             None if *key == "time" => {}
             None => return None,
+        }
+    }
+    // A column that says another unit than the first of its kind is in that.
+    for (ours, at) in &guess.columns {
+        let (key, what) = match meaning(ours).0 {
+            quantity @ Quantity::Gyro => ("gyro", What::Channel(quantity)),
+            quantity @ Quantity::Acc => ("acc", What::Channel(quantity)),
+            _ => continue,
+        };
+        let own = unit_of(&said.names[*at], what, said.names).or(said.units[*at].as_deref());
+        let of_kind = (units.iter()).find(|(known, _)| known == key);
+        let is_given = mapping.unit(ours, what).is_some();
+        if let (Some(own), Some((_, of_kind)), false) = (own, of_kind, is_given)
+            && known(own) != known(of_kind)
+        {
+            units.push((ours.clone(), own.to_owned()));
         }
     }
     let columns = guess.columns.iter();
@@ -290,6 +310,12 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
                 let stated = stated.or_else(|| unit_of(column, what, said.names));
                 let given = mapping.unit(name, what);
                 let unit = given.or(stated);
+                if let (Some(unit), None) = (stated.filter(|u| is_angle(u)), given)
+                    && what == What::Channel(Quantity::Gyro)
+                    && are_increments(column)
+                {
+                    return Err(increments(column, name, unit));
+                }
                 let note = contradiction(name, column, given, stated);
                 found.notes.extend(note);
                 if unit.is_none() {
@@ -308,6 +334,29 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
     }
     found.assume(&assumed);
     Ok(found)
+}
+
+/// Whether a column's name says that it has what an angle grew by from row to row.
+fn are_increments(column: &str) -> bool {
+    let name = column.to_lowercase();
+    ["delta", "dtheta", "dangle", "dang_", "incr"]
+        .iter()
+        .any(|part| name.contains(part))
+}
+
+/// An error of angles that are not to be differenced once more.
+fn increments(column: &str, ours: &str, unit: &str) -> CaptureError {
+    CaptureError::Option {
+        option: "--units",
+        why: format!(
+            "by its name the column `{}` has increments of an angle, in {unit}, and no angle",
+            brief(column)
+        ),
+        help: format!(
+            "say what an increment is as a rate, its size times the sample rate: `--units {ours}=100deg/s` for deg at 100 Hz; \
+             `{ours}={unit}` where it is the angle all the same"
+        ),
+    }
 }
 
 fn given_twice(column: &str, one: &str, other: &str) -> CaptureError {

@@ -3,13 +3,15 @@
 use model::record::Quantity;
 
 use super::conventions::unit_of;
-use super::units::{What, in_brackets, is_unit_of, known};
+use super::units::{What, at_the_end, in_brackets, is_unit_of, known};
 
 mod say;
 pub(super) mod seen;
+mod words;
 
 pub(super) use say::{proposed, unknown};
 use seen::Seen;
+use words::{TURNS, axis_of, words};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -183,10 +185,16 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
     if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
         // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
         let first = |wanted: &dyn Fn(usize) -> bool| (0..meanings.len()).find(|at| wanted(*at));
-        let is_reading = |at: usize| meanings[at].kind != Kind::Time && !seen.rises(at);
+        // Nor what has a place already, or a unit of something else.
+        let taken: Vec<usize> = guess.columns.iter().map(|(_, at)| *at).collect();
+        let may_be = |at: usize| {
+            let unit = in_brackets(&names[at]).1;
+            let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro));
+            meanings[at].kind != Kind::Time && !taken.contains(&at) && unit.is_none_or(is_rate)
+        };
         let found = first(&|at| meanings[at].kind == Kind::Gyro)
-            .or_else(|| first(&is_reading))
-            .or_else(|| first(&|at| meanings[at].kind != Kind::Time));
+            .or_else(|| first(&|at| may_be(at) && !seen.rises(at)))
+            .or_else(|| first(&may_be));
         if let Some(at) = found {
             // The other axes have the same name but for the axis.
             let stem = |at: usize| {
@@ -364,7 +372,14 @@ impl Meaning {
 
     fn of_word(name: &str) -> Self {
         let words = words(in_brackets(name).0);
-        let axis = words.iter().rev().find_map(|word| axis_of(word));
+        // Of a letter and a number, the number counts sensors.
+        let is_number = |word: &&String| word.ends_with(|c: char| c.is_ascii_digit());
+        let axis = words
+            .iter()
+            .rev()
+            .filter(|w| !is_number(w))
+            .find_map(|w| axis_of(w));
+        let axis = axis.or_else(|| words.iter().rev().find_map(|word| axis_of(word)));
         let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
         let first = words.first().map_or("", String::as_str);
         let letters = |list: &[&str]| list.contains(&first);
@@ -373,23 +388,40 @@ impl Meaning {
             words.len() == 1 && known(first).is_some_and(|unit| is_unit_of(unit, What::Time));
         let unit = in_brackets(name).1;
         let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
-        let kind = if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
+        let is_stamp =
+            || is(&["time", "stamp"]) && at_the_end(in_brackets(name).0, What::Time).is_some();
+        let is_called_time = TIME.iter().any(|s| first.starts_with(s));
+        let kind = if unit_is_of(What::Channel(Quantity::Temp)) {
+            Kind::Temp
+        } else if is_called_time && unit_is_of(What::Time) {
+            Kind::Time
+        } else if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
             Kind::Unknown
-        } else if is(&["gyr", "angular", "omega", "rot", "rate", "dreh"])
-            || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
+        } else if is(&[
+            "gyr",
+            "angular",
+            "angul",
+            "omega",
+            "rot",
+            "rate",
+            "dreh",
+            "winkelg",
+            "角速度",
+            "ジャイロ",
+        ]) || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
         {
             Kind::Gyro
-        } else if is(&["acc", "linear"]) || letters(&["a", "ax", "ay", "az"]) {
+        } else if is(&["acc", "linear", "beschl", "加速度"]) || letters(&["a", "ax", "ay", "az"])
+        {
             Kind::Acc
-        } else if is(&["temp"]) {
+        } else if is(&["temp", "温度"]) && !TEMPS.contains(&first) {
             Kind::Temp
-        } else if ["time", "zeit", "stamp", "epoch", "datetime"]
-            .iter()
-            .any(|s| first.starts_with(s))
+        } else if is_called_time
             || first == "t"
             || is_seconds
             || is_of_time
             || unit_is_of(What::Time)
+            || is_stamp()
         {
             Kind::Time
         } else if first == "date" || first == "utc" {
@@ -411,58 +443,12 @@ impl Meaning {
     }
 }
 
-/// The axes' names as angles: about x, y and z.
-const TURNS: [&str; 3] = ["roll", "pitch", "yaw"];
-
-/// 0, 1, 2 for a word that is or ends in an axis; its number, up to 3, where it ends in one.
-fn axis_of(word: &str) -> Option<usize> {
-    if let Some(axis) = TURNS.iter().position(|turn| *turn == word) {
-        return Some(axis);
-    }
-    let stem = word.trim_end_matches(['x', 'y', 'z', '0', '1', '2', '3']);
-    let known = [
-        "", "g", "w", "a", "gyro", "gyr", "acc", "accel", "omega", "angvel", "rate", "rot",
-    ];
-    let last = word.strip_prefix(stem)?;
-    if !known.contains(&stem) {
-        return None;
-    }
-    match last {
-        "x" | "0" => Some(0),
-        "y" | "1" => Some(1),
-        "z" | "2" => Some(2),
-        "3" => Some(3),
-        _ => None,
-    }
-}
-
-/// A word that begins with its axis, in two: `xgyro`, `rollrate`.
-fn axis_first(word: &str) -> Option<(&str, &str)> {
-    let known = ["gyro", "gyr", "acc", "accel", "rate", "speed"];
-    let split = |axis: &&str| Some(word.split_at(word.strip_prefix(*axis).map(|_| axis.len())?));
-    (AXES.iter().chain(&TURNS).filter_map(split)).find(|(_, rest)| known.contains(rest))
-}
-
-/// The words of a name, in small letters: `GyroX`, `gyr[0]`, `w_RS_S_x`.
-fn words(name: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut was_small = false;
-    for c in name.chars() {
-        if !c.is_alphanumeric() || (c.is_uppercase() && was_small) {
-            words.push(String::new());
-        }
-        was_small = c.is_lowercase();
-        if let (true, Some(word)) = (c.is_alphanumeric(), words.last_mut()) {
-            word.extend(c.to_lowercase());
-        }
-    }
-    words.retain(|word| !word.is_empty());
-    let split = |word: String| match axis_first(&word) {
-        Some((axis, rest)) => vec![axis.to_owned(), rest.to_owned()],
-        None => vec![word],
-    };
-    words.into_iter().flat_map(split).collect()
-}
+/// How the name of a time begins.
+const TIME: [&str; 9] = [
+    "time", "zeit", "stamp", "epoch", "datetime", "temps", "tiempo", "時刻", "時間",
+];
+/// Those that begin as a temperature does.
+const TEMPS: [&str; 2] = ["temps", "tempo"];
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Rows of a text.
 
 use super::CaptureError;
-use super::cells::Cells;
+use super::cells::{Cells, is_missing};
 use super::columns::{Column, Role};
 use super::error::brief;
 use super::several::Sensors;
@@ -172,10 +172,4 @@ impl<'a> RowReader<'a> {
         }
         Ok(())
     }
-}
-
-/// Whether a cell says that there is no reading: nothing, or what tables write for it.
-fn is_missing(cell: &str) -> bool {
-    const WORDS: [&str; 7] = ["nan", "na", "n/a", "#n/a", "<na>", "null", "none"];
-    cell.is_empty() || WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }

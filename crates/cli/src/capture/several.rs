@@ -2,6 +2,7 @@
 
 use super::CaptureError;
 use super::columns::Column;
+use super::conventions::DATAFLASH;
 use super::error::brief;
 
 /// What columns that name a sensor are called, letters and digits alone.
@@ -35,9 +36,11 @@ pub(super) struct Sensors {
 impl Sensors {
     /// Of the columns of a file, where one of those that are not read has such a name.
     pub fn of(names: &[String], read: &[Column]) -> Option<Self> {
+        // There it numbers the sensors; elsewhere it may be a current.
+        let is_dataflash = names.iter().any(|name| name == DATAFLASH);
         let is_one = |name: &String| {
             let letters: String = name.chars().filter(char::is_ascii_alphanumeric).collect();
-            NAMES.contains(&letters.to_ascii_lowercase().as_str())
+            NAMES.contains(&letters.to_ascii_lowercase().as_str()) || (name == "I" && is_dataflash)
         };
         let is_read = |at: usize| read.iter().any(|column| column.at == at);
         let (at, name) =

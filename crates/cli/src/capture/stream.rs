@@ -42,8 +42,9 @@ pub fn unpacked<'a>(mut input: impl BufRead + 'a) -> Result<Box<dyn BufRead + 'a
 const FILE: &str = "name it as a file of its own: such a file is read from its end, and neither from a pipe nor packed";
 const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as they are";
 const UTF_8: &str = "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)";
+const MAVLOGDUMP: &str = "make a CSV of it by pymavlink: `mavlogdump.py --types IMU --format csv LOG > imu.csv`; the file is then read as it is";
 /// How files begin that are no text to be read, what they are, and what is to be done.
-const NO_TEXT: [(&[u8], &str, &str); 15] = [
+const NO_TEXT: [(&[u8], &str, &str); 16] = [
     (b"\xff\xfe\0\0", "UTF-32", UTF_8),
     (b"\0\0\xfe\xff", "UTF-32", UTF_8),
     (b"\xff\xfe", "UTF-16", UTF_8),
@@ -63,12 +64,8 @@ const NO_TEXT: [(&[u8], &str, &str); 15] = [
         "SQLite, as a rosbag2 of the ending .db3 is",
         "make an MCAP of it, which is read: `mcap convert FILE.db3 FILE.mcap`, or `ros2 bag convert`",
     ),
-    (
-        b"\xa3\x95",
-        "a log of ArduPilot",
-        "make a CSV of it: `mavlogdump.py --types IMU --format csv LOG.BIN > imu.csv`, and map GyrX in rad/s, AccX in m/s2, \
-         TimeUS in us",
-    ),
+    (b"\xa3\x95", "a log of ArduPilot", MAVLOGDUMP),
+    (b"FMT, 128, 89,", "a log of ArduPilot, as text", MAVLOGDUMP),
     (
         b"H Product:Blackbox",
         "a Blackbox log of Betaflight or INAV",

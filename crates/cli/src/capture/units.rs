@@ -102,6 +102,16 @@ pub(super) fn at_the_end(name: &str, what: What) -> Option<&'static str> {
     if let (What::Time, Some(unit)) = (what, known(name).filter(|unit| is_unit_of(unit, what))) {
         return Some(unit);
     }
+    // `TimeUS`, `timestampMs`.
+    let of_stamp = |unit: &&str| {
+        let stem = name.strip_suffix(*unit);
+        stem.is_some_and(|stem| stem.ends_with("time") || stem.ends_with("stamp"))
+    };
+    if what == What::Time
+        && let Some(unit) = ["ms", "us", "ns"].into_iter().find(|unit| of_stamp(unit))
+    {
+        return Some(unit);
+    }
     // From the longest ending on: `deg_s` before `s`.
     name.match_indices(['_', ' ', '.'])
         .filter_map(|(at, _)| known(&name[at + 1..]))
@@ -205,6 +215,13 @@ pub(super) fn is_unit_of(unit: &str, what: What) -> bool {
     scale(what, unit).is_some()
 }
 
+/// Whether a unit is one of an angle.
+pub(super) fn is_angle(unit: &str) -> bool {
+    let gyro = What::Channel(Quantity::Gyro);
+    let by = known(unit).and_then(|unit| scale(gyro, unit));
+    by.is_some_and(|by| by.unit == ANGLE)
+}
+
 /// How a number of units, as what one count is (`0.0076deg/s`), becomes the unit of ours.
 fn multiple(what: What, given: &str) -> Option<Conversion> {
     if !given.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
@@ -281,6 +298,10 @@ mod tests {
             ("gyro_x_deg_s", gyro, Some("deg/s")),
             ("t_ms", What::Time, Some("ms")),
             ("micros", What::Time, Some("us")),
+            ("ChipTimeUS", What::Time, Some("us")),
+            ("timestampMs", What::Time, Some("ms")),
+            ("times", What::Time, None),
+            ("status", What::Time, None),
             ("ax_mps2", acc, Some("m/s2")),
             ("acc_x_g", acc, Some("g")),
             ("gyro_g", gyro, None),
