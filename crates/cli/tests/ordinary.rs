@@ -303,10 +303,23 @@ fn each_column_has_the_unit_that_its_own_name_says() {
     for columns in ["", "time=time_s,gyro_x=dtheta_x"] {
         let told = refusal(&text, columns, "");
         assert!(
-            told.contains("increments of an angle") && told.contains("gyro_x=100deg/s"),
+            told.contains("increments of an angle") && told.contains("gyro=100deg/s"),
             "{told}"
         );
     }
+    let sloppy = format!("time_s,gyro_x_deg,gyro_y_deg\n{body}");
+    let told = refusal(&sloppy, "", "");
+    assert!(
+        told.contains("has a rate, by its unit (deg) an angle") && told.contains("gyro=deg/s"),
+        "{told}"
+    );
+    assert_eq!(
+        notes(&sloppy, "", "gyro=deg/s").0.channels[0].values[0],
+        1.0
+    );
+    // A unit with a number before it is not that unit.
+    let told = refusal(&format!("time_s,gyro_x (0.01 deg/s),b\n{body}"), "", "");
+    assert!(told.contains("gyro=UNIT"), "{told}");
     let (record, _) = notes(&text, "time=time_s,gyro_x=dtheta_x", "gyro=100deg/s");
     assert_eq!(record.channels[0].values[0], 100.0);
 }
@@ -380,4 +393,31 @@ fn an_imu_of_ardupilots_logs_is_read_from_the_converters_csv_and_two_are_refused
         told.contains("ArduPilot") && told.contains("mavlogdump.py"),
         "{told}"
     );
+}
+
+#[test]
+fn beside_rates_the_attitude_and_the_counts_of_the_same_gyros_are_left() {
+    let body = rows(40, &|k| {
+        format!("{:.2},{},{}", 0.01 * k as f64, 131 * (k % 7), k % 7)
+    });
+    for other in ["Roll (deg)", "Gyro X raw (LSB)"] {
+        let (record, said) = notes(&format!("Time (s),{other},Gyro X (deg/s)\n{body}"), "", "");
+        assert_eq!(
+            record.channel("gyro_x").expect("x").values[3],
+            3.0,
+            "{said}"
+        );
+        assert!(said.contains(&format!("not read: `{other}`")), "{said}");
+    }
+}
+
+#[test]
+fn the_one_column_that_calls_itself_a_time_is_taken_beside_names_of_ours() {
+    let body = rows(40, &|k| {
+        format!("{:.2},{},{}", 0.01 * k as f64, k % 7, k % 5)
+    });
+    for time in ["Elapsed Time", "SampleTimeFine", "Zeit"] {
+        let (record, said) = notes(&format!("{time},gyro_x [deg/s],T\n{body}"), "", "");
+        assert!((middle_step(&record) - 0.01).abs() < 1e-9, "{time}: {said}");
+    }
 }

@@ -15,7 +15,7 @@ use super::mapped::{
 use super::names::{TIMES, in_its_place, left, not_read, other_clock, respelt, taken};
 use super::own::{own, take_counted};
 use super::preamble::Stated;
-use super::propose::{stated_time, unknown};
+use super::propose::{stated_time, times, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
@@ -277,7 +277,11 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
         mapping.columns.is_empty() && has("t_ticks") && said.lines.get("tick_s").is_some();
     // It says the unit of every column.
     let is_export = has("time_s") && said.names.iter().all(|n| said.lines.unit_of(n).is_some());
-    let other_time = stated_time(said.names).filter(|_| !has_time);
+    let other_time = stated_time(said.names).or_else(|| match times(said.names)[..] {
+        [at] if !said.knows_rate => Some(at),
+        _ => None,
+    });
+    let other_time = other_time.filter(|_| !has_time);
     let mut found = Columns {
         notes,
         ..Columns::default()

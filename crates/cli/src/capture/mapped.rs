@@ -225,7 +225,7 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
             .and_then(|(_, at)| said.units[*at].as_deref());
         let is_given = units.iter().any(|(known, _)| known == key);
         let of_increments = (guess.columns.iter())
-            .any(|(ours, at)| ours.starts_with(key) && are_increments(&said.names[*at]));
+            .any(|(ours, at)| ours.starts_with(key) && is_no_angle(&said.names[*at]));
         match (*of_name).or(of_column) {
             _ if is_given => {}
             // What they are has to be said.
@@ -312,9 +312,9 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
                 let unit = given.or(stated);
                 if let (Some(unit), None) = (stated.filter(|u| is_angle(u)), given)
                     && what == What::Channel(Quantity::Gyro)
-                    && are_increments(column)
+                    && is_no_angle(column)
                 {
-                    return Err(increments(column, name, unit));
+                    return Err(no_angle(column, unit));
                 }
                 let note = contradiction(name, column, given, stated);
                 found.notes.extend(note);
@@ -336,25 +336,34 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
     Ok(found)
 }
 
-/// Whether a column's name says that it has what an angle grew by from row to row.
-fn are_increments(column: &str) -> bool {
+/// What a column's name says that it is, where it is no angle although its unit is one.
+fn what_instead(column: &str) -> Option<&'static str> {
     let name = column.to_lowercase();
-    ["delta", "dtheta", "dangle", "dang_", "incr"]
-        .iter()
-        .any(|part| name.contains(part))
+    let has = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
+    if has(&["delta", "dtheta", "dangle", "dang_", "incr"]) {
+        return Some("increments of an angle");
+    }
+    // What stands in brackets was written as a unit.
+    let is_rate = has(&["gyr", "rate", "omega", "angular"]) && in_brackets(column).1.is_none();
+    is_rate.then_some("a rate")
 }
 
-/// An error of angles that are not to be differenced once more.
-fn increments(column: &str, ours: &str, unit: &str) -> CaptureError {
+fn is_no_angle(column: &str) -> bool {
+    what_instead(column).is_some()
+}
+
+/// An error of what is not to be differenced, or to be said that it is.
+fn no_angle(column: &str, unit: &str) -> CaptureError {
     CaptureError::Option {
         option: "--units",
         why: format!(
-            "by its name the column `{}` has increments of an angle, in {unit}, and no angle",
-            brief(column)
+            "by its name the column `{}` has {}, by its unit ({unit}) an angle",
+            brief(column),
+            what_instead(column).unwrap_or_default()
         ),
         help: format!(
-            "say what an increment is as a rate, its size times the sample rate: `--units {ours}=100deg/s` for deg at 100 Hz; \
-             `{ours}={unit}` where it is the angle all the same"
+            "say which: `--units gyro={unit}/s` for a rate; `gyro={unit}` for an angle, which is differenced; for increments \
+             their size times the sample rate, `gyro=100{unit}/s` at 100 Hz"
         ),
     }
 }

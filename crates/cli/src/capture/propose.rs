@@ -3,7 +3,7 @@
 use model::record::Quantity;
 
 use super::conventions::unit_of;
-use super::units::{What, at_the_end, in_brackets, is_unit_of, known};
+use super::units::{What, at_the_end, in_brackets, is_angle, is_unit_of, known};
 
 mod say;
 pub(super) mod seen;
@@ -306,7 +306,9 @@ pub(super) fn stated_time(names: &[String]) -> Option<usize> {
 pub(super) fn times(names: &[String]) -> Vec<usize> {
     let meanings = meanings(names);
     let of = |kind: Kind| {
-        let is_it = |at: &usize| meanings[*at].kind == kind || names[*at] == "host_time_s";
+        // A large T is as often a temperature.
+        let is_kind = |at: usize| meanings[at].kind == kind && names[at] != "T";
+        let is_it = |at: &usize| is_kind(*at) || names[*at] == "host_time_s";
         (0..names.len()).filter(is_it).collect::<Vec<_>>()
     };
     let times = of(Kind::Time);
@@ -346,6 +348,18 @@ fn meanings(names: &[String]) -> Vec<Meaning> {
             let of_kind = meanings.iter_mut().filter(|m| m.kind == kind);
             of_kind.for_each(|m| m.axis = m.axis.map(|axis| axis - 1));
         }
+    }
+    // Beside rates, what is in counts is the same as it came, and what is in an angle is the attitude.
+    let unit = |at: usize| in_brackets(&names[at]).1;
+    let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro)) && !is_angle(unit);
+    let gyros = (0..names.len()).filter(|at| meanings[*at].kind == Kind::Gyro);
+    let (rates, others): (Vec<usize>, Vec<usize>) = gyros
+        .filter(|at| unit(*at).is_some())
+        .partition(|at| unit(*at).is_some_and(is_rate));
+    if !rates.is_empty() {
+        others
+            .iter()
+            .for_each(|at| meanings[*at].kind = Kind::Unknown);
     }
     let at = |letter: &str| {
         (names.iter()).position(|name| in_brackets(name).0.eq_ignore_ascii_case(letter))
@@ -390,7 +404,9 @@ impl Meaning {
         let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
         let is_stamp =
             || is(&["time", "stamp"]) && at_the_end(in_brackets(name).0, What::Time).is_some();
-        let is_called_time = TIME.iter().any(|s| first.starts_with(s));
+        let is_time_of =
+            CLOCKS.contains(&first) && words.get(1).is_some_and(|w| w.starts_with("time"));
+        let is_called_time = is_time_of || TIME.iter().any(|s| first.starts_with(s));
         let kind = if unit_is_of(What::Channel(Quantity::Temp)) {
             Kind::Temp
         } else if is_called_time && unit_is_of(What::Time) {
@@ -443,6 +459,20 @@ impl Meaning {
     }
 }
 
+/// What a time may be of.
+const CLOCKS: [&str; 11] = [
+    "elapsed",
+    "sample",
+    "system",
+    "sys",
+    "device",
+    "sensor",
+    "unix",
+    "utc",
+    "local",
+    "log",
+    "recording",
+];
 /// How the name of a time begins.
 const TIME: [&str; 9] = [
     "time", "zeit", "stamp", "epoch", "datetime", "temps", "tiempo", "時刻", "時間",

@@ -97,6 +97,12 @@ pub(super) fn in_brackets(name: &str) -> (&str, Option<&'static str>) {
 /// What the end of a column's name says of the unit of what it is mapped to: `gx_dps`, `t_ms`, `ax_mps2`.
 pub(super) fn at_the_end(name: &str, what: What) -> Option<&'static str> {
     let name = name.to_lowercase();
+    // A number in brackets multiplies the unit: `(0.01 deg/s)`.
+    let inner = name.trim_end().strip_suffix([')', ']', '}']);
+    let inner = inner.and_then(|name| Some(&name[name.rfind(['(', '[', '{'])? + 1..]));
+    if inner.is_some_and(|unit| unit.trim_start().starts_with(|c: char| c.is_ascii_digit())) {
+        return None;
+    }
     let name = name.trim_end_matches(|c: char| !c.is_alphanumeric());
     // A time may be called by its unit: `millis`, `micros`.
     if let (What::Time, Some(unit)) = (what, known(name).filter(|unit| is_unit_of(unit, what))) {
@@ -305,6 +311,8 @@ mod tests {
             ("ax_mps2", acc, Some("m/s2")),
             ("acc_x_g", acc, Some("g")),
             ("gyro_g", gyro, None),
+            ("gyro_x (0.01 deg/s)", gyro, None),
+            ("gyro_x (in deg/s)", gyro, Some("deg/s")),
             ("gx", gyro, None),
         ] {
             assert_eq!(at_the_end(name, what), unit, "{name}");
