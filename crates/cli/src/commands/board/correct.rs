@@ -55,14 +55,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     })?;
     if !session.quiet {
         for change in &proposed.changed {
-            say!(
-                "{} {:<42} {:>14.9} -> {:>14.9} {}",
-                change.axis,
-                change.what,
-                change.before,
-                change.after,
-                change.unit
+            let (axis, what, unit) = (change.axis, change.what, change.unit);
+            let line = format!(
+                "{axis} {what:<42} {:>14.9} -> {:>14.9} {unit}",
+                change.before, change.after
             );
+            say!("{}", line.trim_end());
         }
         for note in &proposed.board.notes {
             say!("{}", imu_stand::text::item("note: ", note));
@@ -72,6 +70,9 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         proposed.write(&mut session.link)?;
     }
     if !session.quiet {
+        if proposed.changed.is_empty() {
+            say!("the correction in use has these numbers already");
+        }
         if arguments.dry_run {
             say!("nothing is written (--dry-run)");
         } else {

@@ -128,7 +128,7 @@ impl Session {
     }
 }
 
-/// Number of the stored correction, if there is one; a board that does not know of corrections has none.
+/// Number of the correction in use, if one is; a board that does not know of corrections has none.
 pub(super) fn stored_correction(link: &mut Link) -> Result<Option<u16>> {
     let (other, row) = (false, 0);
     match link.ask(Command::GetCorrection { other, row }) {

@@ -50,7 +50,7 @@ pub struct Info {
     pub bias_dps: [f64; 3],
     /// x, y, z.
     pub scale_dps_per_count: [f64; 3],
-    /// Number of the stored correction; null where none is.
+    /// Number of the correction in use; null where none is.
     pub correction: Option<u16>,
 }
 
@@ -153,9 +153,10 @@ impl Info {
             1u32 << self.gyro_filter.min(31)
         );
         let _ = writeln!(out, "  acc          {} g", number(self.acc_range_g));
-        if let Some(number) = self.correction {
-            let _ = writeln!(out, "  correction   {number:#06x}, stored");
-        }
+        let _ = match self.correction {
+            Some(number) => writeln!(out, "  correction   {number:#06x}, stored and in use"),
+            None => writeln!(out, "  correction   none in use"),
+        };
         let _ = writeln!(out, "               bias deg/s   scale deg/s/count");
         for ((axis, bias), scale) in ["x", "y", "z"]
             .iter()
