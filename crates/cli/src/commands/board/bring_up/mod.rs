@@ -136,7 +136,7 @@ const SCOPE: [(&str, &str); 10] = [
     ("OC2 and direction at a reversal", "3 ms of rest between"),
     (
         "OC2 against PD2 as the motor's stop is pressed",
-        "low 0.11 ms behind the first edge at the latest",
+        "low 12 us behind the first edge at the latest",
     ),
     ("bridge's supply at a reversal", "no spike above its rating"),
     ("5 V rail while the motor starts", "4.75 V or more"),
