@@ -434,6 +434,21 @@ fn the_correction_in_use_is_told_with_the_set_up() {
     assert_success(&board.ask(&["correct", "--on"]));
     let said = assert_success(&board.ask(&["info"]));
     assert!(said.contains("stored and in use"), "{said}");
+    // The gyros are set anew: the board does not apply it, and its rates mean nothing.
+    let said = assert_success(&board.ask(&["set", "gyro", "--range", "160", "--filter", "3"]));
+    let stale = "not applied: it is for gyros at 320 deg/s, filter 2";
+    assert!(said.contains(stale), "{said}");
+    let said = assert_success(&board.ask(&["correct", "--on", "--json", out]));
+    assert!(said.contains(stale), "{said}");
+    assert_eq!(json(out.as_ref())["correction_fits"], false);
+    let said = assert_success(&board.ask(&["correct", "--model", model, "--dry-run"]));
+    assert!(
+        said.contains("is for gyros at 320 deg/s, filter 2"),
+        "{said}"
+    );
+    assert_success(&board.ask(&["correct", "--model", model]));
+    let said = assert_success(&board.ask(&["info"]));
+    assert!(said.contains("stored and in use"), "{said}");
 }
 
 #[test]

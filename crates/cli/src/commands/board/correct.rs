@@ -40,8 +40,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let Some(path) = &arguments.model else {
         let on = arguments.on;
         session.link.ask(Command::Correction { on })?;
+        if on {
+            // Which, and whether it is for the gyros as they are set.
+            return session.show_info();
+        }
         if !session.quiet {
-            say!("the correction is {}", if on { "on" } else { "off" });
+            say!("the correction is off");
         }
         return Ok(());
     };
@@ -70,7 +74,10 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         proposed.write(&mut session.link)?;
     }
     if !session.quiet {
-        if proposed.changed.is_empty() {
+        if let Some(was) = proposed.was_for {
+            let was = super::show::gyros_at(was);
+            say!("the one in use is for gyros at {was}, and is not applied as they are set");
+        } else if proposed.is_in_use {
             say!("the correction in use has these numbers already");
         }
         if arguments.dry_run {

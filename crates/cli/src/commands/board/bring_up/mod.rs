@@ -149,7 +149,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     fuses(arguments, &mut steps);
     let hello = session.link.ask_hello()?;
     let mut info = Info::of(&hello, session.link.name());
-    info.correction = super::stored_correction(&mut session.link)?;
+    info.corrected_by(super::correction_in_use(&mut session.link)?);
     set_up(&hello, &mut steps);
     stop_let_go(&mut session.link, &mut steps)?;
     listened(&mut session.link, &hello, &mut steps)?;
