@@ -20,8 +20,9 @@ const COUNT: usize = 100;
 const USAGE: &str = "cargo xtask mutants [--seed N] [--count N] [--minutes N] [--package NAME] [--write]
   draws from cargo-mutants' list (`cargo install cargo-mutants --locked`), and tests each in a copy of the tree; half a minute
   each on two free cores; --write keeps docs/mutants.txt
-cargo xtask mutants --registers [WORD]
-  plants those of the image's registers, or those whose name has the word; leave hil-tests alone meanwhile";
+cargo xtask mutants --registers [WORD | --write]
+  plants those of the image's registers, or those whose name has the word; leave hil-tests alone meanwhile; --write keeps
+  docs/mutants-registers.txt; six minutes on two free cores";
 
 /// What is asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -83,7 +84,7 @@ pub fn hunt(root: &Path, arguments: &[String]) -> Result<(), Failure> {
         return Ok(());
     }
     if asked.registers {
-        return registers::hunt(root, asked.word.as_deref());
+        return registers::hunt(root, asked.word.as_deref(), asked.write);
     }
     let all = list::all(root, asked.package.as_deref())?;
     let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
