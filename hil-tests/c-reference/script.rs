@@ -173,7 +173,7 @@ impl Board for Script {
         3.3
     }
 
-    fn uart_byte(&mut self, _at: u64, byte: u8) {
+    fn uart_byte(&mut self, _at: u64, byte: u8, _bit: u64) {
         self.line.push(byte);
     }
 

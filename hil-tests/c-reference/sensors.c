@@ -4,6 +4,7 @@
 #include <util/delay.h>
 
 #include "gyro.h"
+#include "tick.h"
 
 /* Chip selects: x PB2, y PB3, z PB4 (SS, which has to be an output anyway). */
 #define SELECT_X _BV(PB2)
@@ -45,6 +46,7 @@ void sensors_slow(bool slow)
 static bool transfer(uint8_t out, uint8_t *in)
 {
     SPDR = out;
+    tick_cut_if_pressed(); /* in the first round INT0 is masked */
     for (uint8_t polls = SPI_BUDGET; polls; polls--) {
         if (SPSR & _BV(SPIF)) {
             *in = SPDR;

@@ -208,7 +208,8 @@ bool tick_host_is_there(void)
     return !tick_is_stopped() && alive_ms != 0;
 }
 
-/* The motor's stop: at once, whatever goes on. In the guard and the first round it waits, or it would move the sample. */
+/* The motor's stop: at once, whatever goes on. In the guard and the first round tick_cut_if_pressed
+ * stands for it, or it would move the sample. */
 ISR(INT0_vect)
 {
     stop();
@@ -254,6 +255,13 @@ ISR(TIMER1_COMPB_vect)
     GICR = 0;
     ticked = false;
     struct raw *raw = &raws[filling];
+    /* INT0 is masked now: what it would have seen is looked at until 4 us before compare A. */
+    uint16_t until = OCR1B + (GUARD_TICKS - 1);
+    for (uint8_t left = 250; left; left--) {
+        tick_cut_if_pressed();
+        if (TCNT1 >= until)
+            break;
+    }
     /* Only compare A is left to wake it; the bound is for a wake-up that nobody explains. */
     for (uint8_t left = 4; left && !ticked; left--)
         sleep_now();

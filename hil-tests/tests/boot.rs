@@ -135,7 +135,7 @@ impl Board for Deaf {
     fn aref_volts(&self) -> f64 {
         3.3
     }
-    fn uart_byte(&mut self, _at: u64, _byte: u8) {}
+    fn uart_byte(&mut self, _at: u64, _byte: u8, _bit: u64) {}
     fn pins_changed(&mut self, _at: u64, _pins: &Pins) {}
 }
 

@@ -13,10 +13,10 @@ use wire::{Command, Fault, Shape, Status};
 const US: u64 = 16;
 /// Compare A of timer 1: the tick.
 const TICK: u8 = 6;
-/// From the guard of a tick to the end of its first round over the sensors the stop waits, or it would move the sample.
-const WAITS_US: u64 = 115;
-/// Elsewhere: the longest stretch with interrupts off or interrupt, and its own.
-const AT_ONCE_US: u64 = 15;
+/// The longest stretch with interrupts off or interrupt, and its own; from the guard of a tick to the end of its first round over
+/// the sensors its interrupt is masked, or it would move the sample, and the edge is looked for: 4 us of sleep before the tick and
+/// the way to the first bit to a gyro are the longest.
+const AT_ONCE_US: u64 = 12;
 
 /// Cycles of what the stop concerns.
 #[derive(Default)]
@@ -145,12 +145,11 @@ fn run_to_phase(board: &mut Board, us: f64) {
 }
 
 #[test]
-fn a_press_cuts_full_duty_within_microseconds_at_any_phase_of_the_tick_and_no_later_than_its_first_round()
- {
+fn a_press_cuts_full_duty_within_microseconds_at_any_phase_of_the_tick() {
     let rng = &mut generator(seed());
     let mut board = Board::new(&Scenario::quiet(1));
     // About the tick in steps, and anywhere.
-    let mut phases: Vec<f64> = (-30..30).map(|n| f64::from(n) * 5.0).collect();
+    let mut phases: Vec<f64> = (-35..35).map(|n| f64::from(n) * 2.5).collect();
     phases.extend((0..40).map(|_| uniform(rng, -40_000.0, -200.0)));
     let (mut longest, mut elsewhere) = (0.0f64, 0.0f64);
     for (n, phase) in phases.into_iter().enumerate() {
@@ -178,8 +177,7 @@ fn a_press_cuts_full_duty_within_microseconds_at_any_phase_of_the_tick_and_no_la
         assert!(!board.turned_since(since), "phase {phase} us");
     }
     println!("{longest:.1} us at the longest, {elsewhere:.1} us where no sample is being taken");
-    assert!(longest < WAITS_US as f64, "{longest} us");
-    assert!(elsewhere < AT_ONCE_US as f64, "{elsewhere} us");
+    assert!(longest < AT_ONCE_US as f64, "{longest} us");
     assert_eq!(board.timeouts(), 0, "a stop is no fault");
 }
 

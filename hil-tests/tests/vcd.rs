@@ -15,6 +15,7 @@ struct Dump {
     /// Levels at the begin, and changes.
     first: Vec<bool>,
     changes: Vec<(u64, usize, bool)>,
+    end: u64,
 }
 
 /// Reads it by the standard's grammar, without knowing who wrote it.
@@ -63,6 +64,7 @@ fn parse(text: &str) -> Dump {
         names,
         first,
         changes,
+        end: time,
     }
 }
 
@@ -111,7 +113,7 @@ impl Dump {
         out
     }
 
-    /// Bytes of 8N1, sampled in the middle of each bit.
+    /// Bytes of 8N1, sampled in the middle of each bit; the last may be cut by the end.
     fn bytes(&self, name: &str, baud: f64) -> Vec<u8> {
         let changes = self.of(name);
         let level = |time: u64| {
@@ -127,6 +129,9 @@ impl Dump {
                 continue;
             }
             let middle = |k: f64| start + ((k + 0.5) * bit) as u64;
+            if middle(9.5) > self.end {
+                break;
+            }
             let byte = (0..8).fold(0u8, |byte, k| {
                 byte | u8::from(level(middle(1.0 + f64::from(k)))) << k
             });
@@ -155,6 +160,7 @@ fn samples(bytes: impl IntoIterator<Item = u8>) -> Vec<Sample> {
 fn what_a_logic_analyser_reads_of_the_traces_is_what_the_host_received() {
     let mut run = run(Scenario::quiet(5), 3.0);
     run.requests = duty_profile(&[(0.9, 100)], 3.0);
+    run.scenario.stop_pressed = vec![[2.3, 2.4]];
     let image = image();
     let mut heard = Vec::new();
     let vcd = simavr_traced(&image, &run, [0.0, 2.5], |byte| {
@@ -171,10 +177,30 @@ fn what_a_logic_analyser_reads_of_the_traces_is_what_the_host_received() {
     assert_eq!(heard, unwatched);
 
     // USART: the crystal over 16 times 26.
-    let read = samples(dump.bytes("txd", 16e6 / 16.0 / 26.0));
+    let baud = 16e6 / 16.0 / 26.0;
+    let bytes = dump.bytes("txd", baud);
+    let early = heard.iter().filter(|b| b.time_s < 2.4);
+    assert!(bytes.starts_with(&early.map(|b| b.byte).collect::<Vec<_>>()));
+    let read = samples(bytes);
     let sent = samples(heard.iter().filter(|b| b.time_s < 2.5).map(|b| b.byte));
     assert_eq!(read, sent);
     assert!(read.len() > 20, "{}", read.len());
+
+    // The host's line: a request of each kind that it sent.
+    let mut decoder = wire::RequestDecoder::new();
+    let asked = dump.bytes("rxd", baud).into_iter();
+    let asked: Vec<wire::Request> = asked.filter_map(|byte| decoder.push(byte)?.ok()).collect();
+    let before = run.requests.iter().filter(|r| r.at_us < 2_400_000).count();
+    assert!(asked.len() >= before && before > 10, "{before} {asked:?}");
+
+    // The motor's stop.
+    let stop: Vec<(u64, bool)> = dump.of("stop");
+    let at = |k: usize| stop[k].0 as f64 / 1e12;
+    assert!(stop.len() == 2 && !stop[0].1, "{stop:?}");
+    assert!(
+        (at(0) - 2.3).abs() < 1e-6 && (at(1) - 2.4).abs() < 1e-6,
+        "{stop:?}"
+    );
 
     // SPI: the answer to GYRO_OUT (0x04) comes with the frame after it.
     for (axis, select) in ["cs_x", "cs_y", "cs_z"].into_iter().enumerate() {

@@ -53,6 +53,8 @@ fn port_b() -> &'static avr_device::atmega16::portb::RegisterBlock {
 fn byte(out: u8) -> Result<u8, Stalled> {
     let spi = spi();
     spi.spdr.write(|w| bits!(w, out));
+    // In the first round the motor's stop has no interrupt: one that is pressed is felt here.
+    super::board::cut_motor_if_pressed();
     for _ in 0..SPI_BUDGET {
         if spi.spsr.read().bits() & SPIF != 0 {
             return Ok(spi.spdr.read().bits());

@@ -324,8 +324,8 @@ pub fn unmask() {
     timer1().timsk.write(|w| bits!(w, OCIE1A | OCIE0));
 }
 
-/// The motor's stop: at once, whatever goes on and whether the clocks run. In the guard and the first round over the sensors it
-/// waits, for 0.11 ms at the most, or it would move the sample.
+/// The motor's stop: at once, whatever goes on and whether the clocks run. In the guard and the first round over the sensors
+/// [`board::cut_motor_if_pressed`] stands for it, or it would move the sample; it comes behind that, and notes the stop.
 #[avr_device::interrupt(atmega16)]
 fn INT0() {
     stop();
@@ -380,6 +380,14 @@ fn TIMER1_COMPB() {
     // Chosen before the sleep, and the compiler kept from moving it: the choice takes longer for one place than for the
     // other, and after the wake-up that is jitter.
     let free = known(place(shared.reading ^ 1));
+    // The motor's stop has no interrupt now: its edge is looked for, until 4 us before compare A, which the sleep must not miss.
+    let until = timer1().ocr1b.read().bits().wrapping_add(GUARD_TICKS - 1);
+    for _ in 0..250u8 {
+        board::cut_motor_if_pressed();
+        if timer1().tcnt1.read().bits() >= until {
+            break;
+        }
+    }
     // Only compare A is left to wake it; the bound is for a wake-up that nobody explains.
     for _ in 0..4u8 {
         sleep_now();

@@ -52,8 +52,30 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   compare-peers
            Allan family against allantools (in a venv) and the crate `allan`: speed, memory, agreement; `--long` adds 1e8";
 
+/// What [`USAGE`] says of a command, if that is all there is to say: the others have a help of their own.
+fn help_of(command: &str) -> Option<String> {
+    if ["campaign", "answers", "mutants"].contains(&command) {
+        return None;
+    }
+    let mut lines = USAGE.lines().skip(2).skip_while(|line| {
+        let name = line.strip_prefix("  ");
+        name.is_none_or(|line| line.split(' ').next() != Some(command))
+    });
+    let first = lines.next()?;
+    let rest = lines.take_while(|line| line.starts_with("    "));
+    let text: Vec<&str> = std::iter::once(first).chain(rest).collect();
+    Some(format!("cargo xtask\n{}", text.join("\n")))
+}
+
 fn main() -> ExitCode {
     let command = std::env::args().nth(1);
+    let asks = std::env::args()
+        .skip(2)
+        .any(|word| word == "--help" || word == "-h");
+    if let Some(help) = command.as_deref().filter(|_| asks).and_then(help_of) {
+        println!("{help}");
+        return ExitCode::SUCCESS;
+    }
     // Where it runs, not where it was built: checkouts may share a target folder.
     let own = std::env::var_os("CARGO_MANIFEST_DIR");
     let own = own.map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
@@ -135,7 +157,24 @@ fn say_sizes(elf: &Path) -> Result<String, Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Failure, fuzz, soak};
+    use super::{Failure, fuzz, help_of, soak};
+
+    #[test]
+    fn every_command_says_what_it_does_where_it_is_asked() {
+        for (command, told) in [
+            ("size", "--accept"),
+            ("soak", "--only logic"),
+            ("fuzz", "--target NAME"),
+            ("compare-peers", "--long"),
+            ("image", "firmware.{elf,hex}"),
+        ] {
+            let help = help_of(command).expect("it is a command");
+            assert!(help.contains(told), "{help}");
+            assert!(!help.contains("every check and test"), "{help}");
+        }
+        assert_eq!(help_of("nix"), None);
+        assert_eq!(help_of("campaign"), None, "it has its own");
+    }
 
     #[test]
     fn an_option_that_there_is_not_is_named() {

@@ -17,7 +17,12 @@ use tree::{Outcome, Tree};
 
 /// How many are drawn where nobody says.
 const COUNT: usize = 100;
-const USAGE: &str = "cargo xtask mutants [--seed N] [--count N] [--minutes N] [--package NAME] [--write], or cargo xtask mutants --registers [WORD]";
+const USAGE: &str = "cargo xtask mutants [--seed N] [--count N] [--minutes N] [--package NAME] [--write]
+  draws from cargo-mutants' list (`cargo install cargo-mutants --locked`), and tests each in a copy of the tree; half a minute
+  each on two free cores; --write keeps docs/mutants.txt
+cargo xtask mutants --registers [WORD | --write]
+  plants those of the image's registers, or those whose name has the word; leave hil-tests alone meanwhile; --write keeps
+  docs/mutants-registers.txt; six minutes on two free cores";
 
 /// What is asked for.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -29,6 +34,7 @@ struct Asked {
     package: Option<String>,
     write: bool,
     registers: bool,
+    help: bool,
     /// Of the registers' mutants, those whose name has it.
     word: Option<String>,
 }
@@ -53,6 +59,7 @@ impl Asked {
                 word if asked.registers && !word.starts_with('-') => {
                     asked.word = Some(word.to_owned());
                 }
+                "--help" | "-h" => asked.help = true,
                 word => return Err(bad(word)),
             }
         }
@@ -72,8 +79,12 @@ struct Verdict {
 /// A tool that is missing, tests that fail without a mutant, or fewer caught than asked for.
 pub fn hunt(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     let asked = Asked::of(arguments)?;
+    if asked.help {
+        println!("{USAGE}");
+        return Ok(());
+    }
     if asked.registers {
-        return registers::hunt(root, asked.word.as_deref());
+        return registers::hunt(root, asked.word.as_deref(), asked.write);
     }
     let all = list::all(root, asked.package.as_deref())?;
     let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
@@ -192,6 +203,7 @@ mod tests {
             (Some(7), Some(20), true)
         );
         assert!(of(&["--registers", "TXC"]).is_ok_and(|asked| asked.word.is_some()));
+        assert!(of(&["--help"]).is_ok_and(|asked| asked.help));
         assert!(of(&["--seed"]).is_err() && of(&["TXC"]).is_err());
     }
 }

@@ -51,11 +51,28 @@ fn main() -> ExitCode {
     }
 }
 
+/// The first words of the records' names.
+fn kinds(entries: &[Entry]) -> String {
+    let mut kinds: Vec<&str> = entries
+        .iter()
+        .filter_map(|e| e.name.split(' ').next())
+        .collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds.join(", ")
+}
+
 /// Whether nothing moved.
 fn answered(a: &Arguments) -> Result<bool, String> {
     let mut entries = records::all()?;
     if let Some(text) = &a.only {
+        let kinds = kinds(&entries);
         entries.retain(|e| e.name.contains(text));
+        if entries.is_empty() {
+            return Err(format!(
+                "no record's name holds `{text}`; they begin with {kinds}"
+            ));
+        }
     }
     let begun = Instant::now();
     let answers = run(&entries, a.threads);
@@ -168,4 +185,19 @@ fn compare_with(
         println!("what moved: {}", kinds.join(", "));
     }
     Ok(moved == 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_that_no_record_has_is_an_error_that_names_the_kinds() {
+        let asked = Arguments::parse_from(["answers", "--compare", "x", "--only", "nix"]);
+        let said = answered(&asked).expect_err("there is none");
+        assert!(
+            said.contains("`nix`") && said.contains("campaign, "),
+            "{said}"
+        );
+    }
 }

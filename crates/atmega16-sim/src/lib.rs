@@ -41,8 +41,8 @@ pub trait Board {
     fn adc_volts(&mut self, at: u64, channel: u8) -> f64;
     /// The voltage at AREF, V.
     fn aref_volts(&self) -> f64;
-    /// A byte has gone out on TXD, the end of its stop bit at cycle `at`.
-    fn uart_byte(&mut self, at: u64, byte: u8);
+    /// A byte has gone out on TXD, the end of its stop bit at cycle `at`, each of its bits so many cycles long.
+    fn uart_byte(&mut self, at: u64, byte: u8, bit: u64);
     /// A port has changed.
     fn pins_changed(&mut self, at: u64, pins: &Pins);
     /// OC2 puts out something else.
@@ -202,10 +202,10 @@ impl Mcu {
         self.send_at(at, byte);
     }
 
-    /// As [`Mcu::send`], not before a cycle.
-    pub fn send_at(&mut self, at: u64, byte: u8) {
+    /// As [`Mcu::send`], not before a cycle. Returns when its start bit begins and how long a bit is, cycles.
+    pub fn send_at(&mut self, at: u64, byte: u8) -> (f64, f64) {
         let at = at.max(self.cycle());
-        self.core.chip_mut().usart.host_sends(at, byte, true);
+        self.core.chip_mut().usart.host_sends(at, byte, true)
     }
 
     /// As [`Mcu::send`], with a stop bit that is low.

@@ -146,13 +146,15 @@ impl Usart {
         self.host_bit = cycles;
     }
 
-    /// The host sends a byte, not before `at` and not before what it is sending has gone out.
-    pub fn host_sends(&mut self, at: u64, byte: u8, stop_bit: bool) {
+    /// The host sends a byte, not before `at` and not before what it is sending has gone out: when that begins, and the time
+    /// of a bit.
+    pub fn host_sends(&mut self, at: u64, byte: u8, stop_bit: bool) -> (f64, f64) {
         let bit = self.host_bit.unwrap_or(self.bit() as f64);
         let start = self.line.free.max(at as f64);
         let bits = u16::from(byte) << 1 | u16::from(stop_bit) << 9;
         self.line.chars.push_back(Char { start, bit, bits });
         self.line.free = start + 10.0 * bit;
+        (start, bit)
     }
 
     /// Bytes of the host that have not yet gone out at `now`.

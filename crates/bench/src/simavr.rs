@@ -15,7 +15,7 @@ use atmega16_sim::{LoadError, Mcu, Port, ResetCause, Stop};
 use wire::{Request, encode_request};
 
 pub use self::error::{Died, SimavrError};
-pub use self::vcd::Vcd;
+pub use self::vcd::{TRACES, Vcd};
 use self::world::World;
 use crate::native::{CLOCK_HZ, Instants, Timeline};
 use crate::run::{Cable, with_nonce};
@@ -71,6 +71,20 @@ pub enum Event {
     Uart {
         /// The byte.
         byte: u8,
+        /// Cycles of each bit.
+        bit: u64,
+    },
+    /// The host begins to send a byte at RXD. It is told as the byte is put on the line, which may be before its cycle.
+    Received {
+        /// The byte.
+        byte: u8,
+        /// Cycles of each bit.
+        bit: f64,
+    },
+    /// The motor's stop is pressed, or let go.
+    Stop {
+        /// PD2 is low.
+        pressed: bool,
     },
 }
 
@@ -159,6 +173,8 @@ impl<P: Probe> Simulated<P> {
 
     /// Presses the motor's stop now, or lets it go: its contact ties PD2 to ground, or leaves it to the pull-up.
     pub fn press_stop(&mut self, pressed: bool) {
+        let at = self.mcu.cycle();
+        self.world.probe.event(at, Event::Stop { pressed });
         if pressed {
             self.mcu.drive(Port::D, STOP, 0);
         } else {
@@ -233,9 +249,14 @@ impl<P: Probe> Simulated<P> {
 
     /// The host sends bytes now.
     pub fn send(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.mcu.send(byte);
-        }
+        let now = self.mcu.cycle();
+        bytes.iter().for_each(|&byte| self.send_at(now, byte));
+    }
+
+    fn send_at(&mut self, at: u64, byte: u8) {
+        let (start, bit) = self.mcu.send_at(at, byte);
+        let probe = &mut self.world.probe;
+        probe.event(start.round() as u64, Event::Received { byte, bit });
     }
 
     /// The chip's power goes and comes back at once; the sensors keep theirs.
@@ -277,7 +298,7 @@ impl<P: Probe> Simulated<P> {
                     let len = encode_request(&request, &mut line).unwrap_or(0);
                     line.into_iter()
                         .take(len)
-                        .for_each(|byte| self.mcu.send_at(at, byte));
+                        .for_each(|byte| self.send_at(at, byte));
                 }
             }
             let stop = self.mcu.run_until(until, &mut self.world);
@@ -363,18 +384,8 @@ pub fn simavr_traced(
     let probe = Vcd::new((from * hz) as u64, (to * hz) as u64, hz);
     let mut simulated = Simulated::new(image, &run.scenario, probe)?;
     simulated.request(&run.requests);
-    let mut millisecond = 0u64;
-    loop {
-        let bit = simulated.mcu().uart_bit_cycles();
-        simulated.probe_mut().set_bit_cycles(bit);
-        millisecond += 1;
-        let t = (millisecond as f64 * 1e-3).min(run.seconds);
-        let is_over = simulated.probe().is_over(simulated.mcu().cycle());
-        let t = if is_over { run.seconds } else { t };
-        if simulated.run_until(t, &mut receive)? == Ending::Stopped || t >= run.seconds {
-            return Ok(simulated.probe().clone());
-        }
-    }
+    simulated.run_until(run.seconds, &mut receive)?;
+    Ok(simulated.probe().clone())
 }
 
 /// Notes when the image does what in each tick.

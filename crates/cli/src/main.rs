@@ -66,7 +66,7 @@ enum Command {
     Report(commands::report::Arguments),
     /// The simulated stand with something hidden in it: capture, analysis, diagnosis in one go.
     #[command(
-        after_help = "Examples:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html\n  imu-stand run --native --hide none --stand-seed 3 --noise-seed 2 --out run2.csv\n  imu-stand run --native --pty --hide none --pose 40:+x,80:-x,120:+y,160:-y,200:-z\n  imu-stand run --hide none --seconds 60 --vcd traces.vcd --vcd-span 0,2"
+        after_help = "Examples:\n  imu-stand run --native --hide random --seed 7 --out run.csv --report report.html\n  imu-stand run --native --hide none --stand-seed 3 --noise-seed 2 --out run2.csv\n  imu-stand run --native --pty --hide none --pose 40:+x,80:-x,120:+y,160:-y,200:-z,240:+z\n  imu-stand run --hide none --seconds 60 --vcd traces.vcd --vcd-span 0,2"
     )]
     Run(commands::run::Arguments),
     /// A capture straight from a model file.

@@ -403,15 +403,19 @@ fn a_slow_board_is_waited_for() {
 }
 
 #[test]
-fn the_correction_that_is_stored_is_told_with_the_set_up() {
+fn the_correction_in_use_is_told_with_the_set_up() {
     let board = Board::start();
     let folder = folder("board_correction");
     let [model, out] = ["model.toml", "info.json"].map(|name| folder.join(name));
     std::fs::write(&model, model::ModelFile::paper().to_toml()).expect("a file");
     let [model, out] = [&model, &out].map(|path| path.to_str().expect("a name"));
     let said = assert_success(&board.ask(&["info", "--json", out]));
-    assert!(!said.contains("correction"), "{said}");
+    assert!(said.contains("correction none in use"), "{said}");
     assert!(json(out.as_ref())["correction"].is_null());
+    assert_refused(
+        &board.ask(&["correct", "--on"]),
+        &["no stored correction", "correct --model model.toml"],
+    );
     let written = assert_success(&board.ask(&["correct", "--model", model]));
     let said = assert_success(&board.ask(&["info", "--json", out]));
     let number = json(out.as_ref())["correction"].as_u64().expect("a number");
@@ -420,4 +424,43 @@ fn the_correction_that_is_stored_is_told_with_the_set_up() {
         written.contains(&number) && said.contains(&number),
         "{written}{said}"
     );
+    // The same again: nothing that would change.
+    let said = assert_success(&board.ask(&["correct", "--model", model, "--dry-run"]));
+    assert!(said.contains("has these numbers already"), "{said}");
+    // Off until the next reset.
+    assert_success(&board.ask(&["correct", "--off"]));
+    let said = assert_success(&board.ask(&["info"]));
+    assert!(said.contains("correction none in use"), "{said}");
+    assert_success(&board.ask(&["correct", "--on"]));
+    let said = assert_success(&board.ask(&["info"]));
+    assert!(said.contains("stored and in use"), "{said}");
+    // The gyros are set anew: the board does not apply it, and its rates mean nothing.
+    let said = assert_success(&board.ask(&["set", "gyro", "--range", "160", "--filter", "3"]));
+    let stale = "not applied: it is for gyros at 320 deg/s, filter 2";
+    assert!(said.contains(stale), "{said}");
+    let said = assert_success(&board.ask(&["correct", "--on", "--json", out]));
+    assert!(said.contains(stale), "{said}");
+    assert_eq!(json(out.as_ref())["correction_fits"], false);
+    let said = assert_success(&board.ask(&["correct", "--model", model, "--dry-run"]));
+    assert!(
+        said.contains("is for gyros at 320 deg/s, filter 2"),
+        "{said}"
+    );
+    assert_success(&board.ask(&["correct", "--model", model]));
+    let said = assert_success(&board.ask(&["info"]));
+    assert!(said.contains("stored and in use"), "{said}");
+}
+
+#[test]
+fn a_profile_that_is_too_fast_for_the_ramp_is_told() {
+    let board = Board::start();
+    let profile = |period: &str| {
+        let mut words = vec!["motor", "--shape", "sine", "--amplitude", "60"];
+        words.extend(["--period-ms", period, "--seconds", "1.5"]);
+        assert_success(&board.ask(&words))
+    };
+    let said = profile("2");
+    assert!(said.contains("too short for the ramp"), "{said}");
+    let said = profile("1200");
+    assert!(!said.contains("note"), "{said}");
 }

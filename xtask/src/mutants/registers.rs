@@ -113,6 +113,12 @@ const TABLE: &[Planted] = &[
         "    sense_stop(0);\n", ""),
     planted("the motor's stop is deaf from the first sample on", [TICK, "stop"],
         "    serial::unmask(unsafe { (*shared()).masked_ucsrb });\n    sense_stop(INT0_ON);\n", "    serial::unmask(unsafe { (*shared()).masked_ucsrb });\n"),
+    planted("the motor's stop is not looked for in the guard", [TICK, "stop"],
+        "        board::cut_motor_if_pressed();\n        if timer1()", "        if timer1()"),
+    planted("the guard looks for the stop until the tick", [TICK, "timing"],
+        "wrapping_add(GUARD_TICKS - 1)", "wrapping_add(GUARD_TICKS + 1)"),
+    planted("the motor's stop is not looked for in the first round", [SENSORS, "stop"],
+        "    super::board::cut_motor_if_pressed();\n", ""),
     planted("the pin of the motor's stop is not looked at", [TICK, "stop"],
         "pind.read().bits() & STOP == 0", "pind.read().bits() & 0 != 0"),
     planted("a keep-alive from before the motor's stop counts behind it", [TICK, "stop"],
@@ -149,11 +155,28 @@ const TABLE: &[Planted] = &[
         "let mut free = 0u16;", "let mut free = 64u16;"),
 ];
 
-/// Plants each of them, or those whose name has the word.
+/// Where what catches each of them is kept.
+const KEPT: &str = "docs/mutants-registers.txt";
+
+/// A line of it: the fault, its file, the program and the test that fails.
+fn line(one: &Planted, by: Option<&str>) -> String {
+    let Planted {
+        what, file, test, ..
+    } = one;
+    format!("{what}\n    {file}; {test}: {}\n", by.unwrap_or("NOBODY"))
+}
+
+/// Plants each of them, or those whose name has the word, and keeps what catches them where that is asked for.
 ///
 /// # Errors
 /// An image that does not build, or a fault that its test does not notice.
-pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
+pub fn hunt(root: &Path, word: Option<&str>, write: bool) -> Result<(), Failure> {
+    if write && word.is_some() {
+        return Err(Failure::new(
+            "--write keeps all of them, and a word leaves some out",
+            "leave out the word, or --write",
+        ));
+    }
     let tree = Tree::copy(root, "image")?;
     let chosen = TABLE
         .iter()
@@ -171,6 +194,7 @@ pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
         }
     }
     let (mut caught, mut survived) = (0, Vec::new());
+    let mut kept = "# `cargo xtask mutants --registers --write` writes this: faults of the registers, and the test that fails first.\n".to_owned();
     for one in chosen {
         let by = tree.changed(
             one.file,
@@ -180,6 +204,7 @@ pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
                 tree.test_image(&built.elf, one.test)
             },
         )?;
+        kept.push_str(&line(one, by.as_deref()));
         match by {
             Some(by) => {
                 println!("caught    {}: {} by {}: {by}", one.file, one.what, one.test);
@@ -192,6 +217,10 @@ pub fn hunt(root: &Path, word: Option<&str>) -> Result<(), Failure> {
         }
     }
     println!("{caught} of {} caught", caught + survived.len());
+    if write {
+        std::fs::write(root.join(KEPT), kept)
+            .map_err(|error| Failure::new(&format!("{KEPT}: {error}"), "make room for it"))?;
+    }
     if survived.is_empty() {
         return Ok(());
     }
@@ -220,5 +249,21 @@ mod tests {
             let test = format!("hil-tests/tests/{}.rs", one.test);
             assert!(root.join(test).exists(), "{}", one.test);
         }
+    }
+
+    #[test]
+    fn the_page_that_is_kept_has_each_fault_with_a_test_that_is_there() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let kept = std::fs::read_to_string(root.join(KEPT)).expect("it is kept");
+        let mut lines = kept.lines().filter(|line| !line.starts_with('#'));
+        for one in TABLE {
+            assert_eq!(lines.next(), Some(one.what), "`--registers --write` is due");
+            let by = lines.next().and_then(|by| by.rsplit(": ").next());
+            let test = format!("hil-tests/tests/{}.rs", one.test);
+            let program = std::fs::read_to_string(root.join(test)).expect("a program");
+            let named = by.is_some_and(|by| program.contains(&format!("fn {by}(")));
+            assert!(named, "{}: {by:?}", one.what);
+        }
+        assert_eq!(lines.next(), None);
     }
 }

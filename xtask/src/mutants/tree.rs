@@ -188,7 +188,11 @@ impl Tree {
         if !self.watch(build.arg("--no-run"), DEADLINE)?.passed {
             return Err(Failure::new(
                 &format!("hil-tests/tests/{program}.rs does not compile"),
-                "a test that is no program notices nothing: mend it first",
+                &format!(
+                    "a test that is no program notices nothing; {} says why. It is of the working tree, which is to be left alone \
+                     meanwhile",
+                    self.root.with_extension("log").display()
+                ),
             ));
         }
         let mut command = crate::cargo(&self.origin, &arguments);

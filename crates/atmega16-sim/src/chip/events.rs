@@ -42,7 +42,7 @@ impl Chip {
     pub fn process(&mut self, now: u64, board: &mut dyn Board) -> bool {
         while let Some(at) = self.usart.next().filter(|&at| at <= now) {
             if let Some((end, byte)) = self.usart.process(at) {
-                board.uart_byte(end, byte);
+                board.uart_byte(end, byte, self.usart.bit_cycles());
             }
         }
         if let Err(what) = self.convert(now, board) {

@@ -94,7 +94,7 @@ impl Board for Recorder {
     fn aref_volts(&self) -> f64 {
         self.aref
     }
-    fn uart_byte(&mut self, at: u64, byte: u8) {
+    fn uart_byte(&mut self, at: u64, byte: u8, _bit: u64) {
         self.uart.push((at, byte));
     }
     fn pins_changed(&mut self, at: u64, pins: &Pins) {

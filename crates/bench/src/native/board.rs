@@ -310,6 +310,8 @@ impl Board for HostBoard {
 
     fn forget_stop(&mut self) {
         let chip = &mut *self.0.borrow_mut();
+        // What was pressed and let go while nobody looked is seen by the chip's interrupt, and forgotten as well.
+        chip.is_stopped();
         if std::mem::take(&mut chip.stopped) {
             chip.alive = 0;
         }

@@ -5,6 +5,8 @@
 //! | `cs_x`, `cs_y`, `cs_z` | PB2, PB3, PB4 | each change, to the cycle |
 //! | `sck`, `mosi`, `miso` | PB7, PB5, PB6 | each byte at its last bit, its bits by the clock that the chip is set to (mode 3) |
 //! | `txd` | PD1 | each byte at the end of its stop bit, its bits by the divisor that the chip is set to |
+//! | `rxd` | PD0 | each byte of the host, its bits by the host's clock |
+//! | `stop` | PD2 | each change: low as the motor's stop is pressed |
 //! | `oc2` | PD7 | frequency and width as the timer is set; where in a pulse it starts is not simulated |
 //! | `direction` | PD6 | each change |
 //! | `tick` | - | the interrupt of the sampling instant: high for 1 us from its flag on |
@@ -15,7 +17,7 @@ use std::fmt::Write as _;
 use super::{Event, Probe, TICK_VECTOR};
 
 /// The traces, in their order: name, and level before anything has happened.
-const TRACES: [(&str, bool); 11] = [
+pub const TRACES: [(&str, bool); 13] = [
     ("cs_x", true),
     ("cs_y", true),
     ("cs_z", true),
@@ -27,6 +29,8 @@ const TRACES: [(&str, bool); 11] = [
     ("direction", false),
     ("tick", false),
     ("adc", false),
+    ("rxd", true),
+    ("stop", true),
 ];
 const SCK: usize = 3;
 const MOSI: usize = 4;
@@ -36,6 +40,8 @@ const OC2: usize = 7;
 const DIRECTION: usize = 8;
 const TICK: usize = 9;
 const ADC: usize = 10;
+const RXD: usize = 11;
+const STOP: usize = 12;
 /// How long a mark is high, cycles: 1 us.
 const MARK: u64 = 16;
 /// Steps of time in a second.
@@ -46,8 +52,8 @@ const PER_SECOND: f64 = 1e12;
 pub struct Vcd {
     from: u64,
     to: u64,
-    /// Cycles of a bit on the line now.
-    bit_cycles: u64,
+    /// Of each trace the last change before the stretch: how it begins.
+    before: [(u64, bool); TRACES.len()],
     /// Cycle, trace, level: bytes are known at their ends, so these are put in order at last.
     changes: Vec<(u64, usize, bool)>,
     /// Since when OC2 puts out what, and that: width 0..=1, pulses a second.
@@ -62,27 +68,22 @@ impl Vcd {
         Self {
             from,
             to,
-            bit_cycles: 0,
+            before: TRACES.map(|(_, level)| (0, level)),
             changes: Vec::new(),
             pulse: (0, 0.0, 0.0),
             hz,
         }
     }
 
-    /// Whether its stretch is over by then.
-    #[must_use]
-    pub fn is_over(&self, cycle: u64) -> bool {
-        cycle >= self.to
-    }
-
-    /// The line's speed as it is now, cycles a bit.
-    pub fn set_bit_cycles(&mut self, cycles: u64) {
-        self.bit_cycles = cycles;
-    }
-
     fn change(&mut self, at: u64, trace: usize, level: bool) {
-        // Levels before the stretch count for how it begins.
-        if at <= self.to {
+        if at < self.from {
+            // Hours may lie before the stretch: they leave one level each.
+            if let Some(last) = self.before.get_mut(trace)
+                && at >= last.0
+            {
+                *last = (at, level);
+            }
+        } else if at <= self.to {
             self.changes.push((at, trace, level));
         }
     }
@@ -106,13 +107,13 @@ impl Vcd {
     }
 
     /// A byte of 8N1, the lowest bit first.
-    fn uart(&mut self, end: u64, byte: u8) {
-        let start = end.saturating_sub(10 * self.bit_cycles);
-        self.change(start, TXD, false);
-        for k in 0..8u64 {
-            self.change(start + (k + 1) * self.bit_cycles, TXD, byte >> k & 1 != 0);
+    fn uart(&mut self, start: f64, trace: usize, byte: u8, bit: f64) {
+        let at = |k: u32| (start + f64::from(k) * bit).round() as u64;
+        self.change(at(0), trace, false);
+        for k in 0..8 {
+            self.change(at(k + 1), trace, byte >> k & 1 != 0);
         }
-        self.change(start + 9 * self.bit_cycles, TXD, true);
+        self.change(at(9), trace, true);
     }
 
     /// The pulses of OC2 up to a cycle.
@@ -152,12 +153,7 @@ impl Vcd {
             let _ = writeln!(out, "$var wire 1 {} {name} $end", code(k));
         }
         out.push_str("$upscope $end\n$enddefinitions $end\n");
-        let mut levels = TRACES.map(|(_, level)| level);
-        let (before, within) =
-            changes.split_at(changes.partition_point(|(at, ..)| *at < self.from));
-        before
-            .iter()
-            .for_each(|(_, trace, level)| levels[*trace] = *level);
+        let mut levels = whole.before.map(|(_, level)| level);
         let time = |cycle: u64| (cycle as f64 / self.hz * PER_SECOND).round() as u64;
         let _ = write!(out, "#{}\n$dumpvars\n", time(self.from));
         for (k, level) in levels.iter().enumerate() {
@@ -165,7 +161,7 @@ impl Vcd {
         }
         out.push_str("$end\n");
         let mut last = self.from;
-        for (at, trace, level) in within {
+        for (at, trace, level) in &changes {
             if std::mem::replace(&mut levels[*trace], *level) == *level {
                 continue;
             }
@@ -184,7 +180,11 @@ impl Probe for Vcd {
         match event {
             Event::Select { axis, selected } => self.change(at, axis, !selected),
             Event::Spi { mosi, miso, cycles } => self.spi(at, mosi, miso, cycles),
-            Event::Uart { byte } => self.uart(at, byte),
+            Event::Uart { byte, bit } => {
+                self.uart(at.saturating_sub(10 * bit) as f64, TXD, byte, bit as f64);
+            }
+            Event::Received { byte, bit } => self.uart(at as f64, RXD, byte, bit),
+            Event::Stop { pressed } => self.change(at, STOP, !pressed),
             Event::Adc { .. } => self.mark(at, ADC),
             Event::Interrupt {
                 vector: TICK_VECTOR,
@@ -206,6 +206,19 @@ impl Probe for Vcd {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hours_before_the_stretch_leave_one_level_of_each_trace() {
+        let mut vcd = Vcd::new(1_000_000, 1_000_100, 16e6);
+        for at in (0..1_000_000).step_by(100) {
+            let (axis, selected) = (2, at % 200 == 100);
+            vcd.event(at, Event::Select { axis, selected });
+            let (high, hz) = (0.5, 7812.5);
+            vcd.event(at, Event::Pulse { high, hz });
+        }
+        assert!(vcd.changes.len() < 10, "{}", vcd.changes.len());
+        assert!(vcd.text().contains("\n0#\n"), "cs_z was left low");
+    }
 
     #[test]
     fn a_byte_is_eight_bits_by_the_clock_and_the_stretch_begins_as_it_was_left() {

@@ -160,8 +160,8 @@ impl<P: Probe> Board for World<P> {
         self.stand.aref_volts()
     }
 
-    fn uart_byte(&mut self, at: u64, byte: u8) {
-        self.probe.event(at, Event::Uart { byte });
+    fn uart_byte(&mut self, at: u64, byte: u8, bit: u64) {
+        self.probe.event(at, Event::Uart { byte, bit });
         self.sent.push_back((at, byte));
         if let Some(Ok(Frame::Reply(reply))) = self.decoder.push(byte)
             && reply.command == code::ARM

@@ -164,6 +164,18 @@ fn the_motors_stop_ends_it_until_it_is_armed_anew() {
 }
 
 #[test]
+fn a_stop_that_was_pressed_and_let_go_before_the_motor_is_armed_refuses_nothing() {
+    let mut run = run(Scenario::quiet(2), 6.0);
+    run.scenario.stop_pressed = vec![[1.0, 1.2]];
+    run.requests = duty_profile(&[(2.0, 200)], 5.0);
+    let heard = hear(&run);
+    let refused = heard.replies().into_iter();
+    let refused: Vec<_> = refused.filter(|r| r.status != Status::Ok).collect();
+    assert!(refused.is_empty(), "{refused:?}");
+    assert_eq!(heard.samples()[80].pwm, 200);
+}
+
+#[test]
 fn a_bias_null_takes_the_bias_off_the_rates() {
     let mut run = run(Scenario::quiet(3), 40.0);
     run.scenario.gyros[0].turn_on_bias_dps = 2.0;

@@ -30,6 +30,10 @@ pub struct Proposed {
     pub board: BoardCorrection,
     /// What differs from the one in use.
     pub changed: Vec<Change>,
+    /// Whether the one in use is this one, its generation aside.
+    pub is_in_use: bool,
+    /// The SENS/AVG that the one in use is for, where that is another.
+    pub was_for: Option<u16>,
     numbers: Numbers,
 }
 
@@ -94,9 +98,13 @@ impl Proposed {
         let generation = before.map_or(0, |old| old[0].to_le_bytes()[1].wrapping_add(1));
         numbers[0] = i16::from_le_bytes([correction::FORMAT, generation]);
         let changed = changes(&before.unwrap_or([0; NUMBERS]), &numbers);
+        let is_in_use = before.is_some_and(|old| old[1..] == numbers[1..]);
+        let was_for = before.map(|old| old[3] as u16);
         Ok(Ok(Self {
             board,
             changed,
+            is_in_use,
+            was_for: was_for.filter(|was| *was != numbers[3] as u16),
             numbers,
         }))
     }

@@ -62,7 +62,7 @@ pub enum LinkError {
         help: String,
     },
     /// The board says no.
-    #[error("the board refuses `{command}`: {}", words(*.status))]
+    #[error("the board refuses `{command}`: {}", why(*.code, *.status))]
     #[diagnostic(code(link::refused), help("{}", remedy(*.code, *.status)))]
     Refused {
         /// The command.
@@ -138,6 +138,16 @@ pub const fn words(status: Status) -> &'static str {
     }
 }
 
+/// A refusal in words.
+const fn why(code: u8, status: Status) -> &'static str {
+    match status {
+        Status::NoConfig if code == wire::code::CORRECTION => {
+            "no stored correction passes its check"
+        }
+        status => words(status),
+    }
+}
+
 /// What to do about a refusal.
 fn remedy(code: u8, status: Status) -> &'static str {
     let is = |command: Command| command.code() == code;
@@ -173,6 +183,9 @@ fn remedy(code: u8, status: Status) -> &'static str {
         }
         Status::NotStored => {
             "repeat it with a steady supply; if it fails again the EEPROM is worn out"
+        }
+        Status::NoConfig if code == wire::code::CORRECTION => {
+            "`board correct --model model.toml` writes one"
         }
         Status::NoConfig => "`board set` what you need, then `board store`",
         Status::Stopped => {

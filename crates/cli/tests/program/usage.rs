@@ -31,6 +31,10 @@ fn what_is_wrong_whatever_the_files_hold_and_whatever_is_connected_exits_2() {
         ("run --native --out -", "--out run.csv"),
         ("run --native --out r.npz", "name it .csv"),
         ("run --native --port x", "--correct"),
+        (
+            "run --vcd t.vcd --vcd-span 70,80 --seconds 60",
+            "ends at 80 s, and the run at 60 s",
+        ),
         ("simulate --seconds 1e300 --out s.csv", "1e300 s at 20 Hz"),
         ("simulate --seconds 0.001 --out s.csv", "--seconds"),
         ("paper --out p --channel nix", "gyro_x, gyro_y, gyro_z"),

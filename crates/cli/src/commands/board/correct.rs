@@ -40,8 +40,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     let Some(path) = &arguments.model else {
         let on = arguments.on;
         session.link.ask(Command::Correction { on })?;
+        if on {
+            // Which, and whether it is for the gyros as they are set.
+            return session.show_info();
+        }
         if !session.quiet {
-            say!("the correction is {}", if on { "on" } else { "off" });
+            say!("the correction is off");
         }
         return Ok(());
     };
@@ -55,14 +59,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     })?;
     if !session.quiet {
         for change in &proposed.changed {
-            say!(
-                "{} {:<42} {:>14.9} -> {:>14.9} {}",
-                change.axis,
-                change.what,
-                change.before,
-                change.after,
-                change.unit
+            let (axis, what, unit) = (change.axis, change.what, change.unit);
+            let line = format!(
+                "{axis} {what:<42} {:>14.9} -> {:>14.9} {unit}",
+                change.before, change.after
             );
+            say!("{}", line.trim_end());
         }
         for note in &proposed.board.notes {
             say!("{}", imu_stand::text::item("note: ", note));
@@ -72,6 +74,12 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         proposed.write(&mut session.link)?;
     }
     if !session.quiet {
+        if let Some(was) = proposed.was_for {
+            let was = super::show::gyros_at(was);
+            say!("the one in use is for gyros at {was}, and is not applied as they are set");
+        } else if proposed.is_in_use {
+            say!("the correction in use has these numbers already");
+        }
         if arguments.dry_run {
             say!("nothing is written (--dry-run)");
         } else {

@@ -118,8 +118,9 @@ pub(crate) struct Session {
 impl Session {
     /// Prints the set-up as it now is, and writes it where JSON was asked for.
     fn show_info(&mut self) -> Result<()> {
-        let mut info = Info::of(&self.link.ask_hello()?, self.link.name());
-        info.correction = stored_correction(&mut self.link)?;
+        let hello = self.link.ask_hello()?;
+        let mut info = Info::of(&hello, self.link.name());
+        info.corrected_by(correction_in_use(&mut self.link)?);
         super::write_json(self.json.as_ref(), &info)?;
         if !self.quiet {
             say!("{}", info.text().trim_end());
@@ -128,14 +129,20 @@ impl Session {
     }
 }
 
-/// Number of the stored correction, if there is one; a board that does not know of corrections has none.
-pub(super) fn stored_correction(link: &mut Link) -> Result<Option<u16>> {
-    let (other, row) = (false, 0);
-    match link.ask(Command::GetCorrection { other, row }) {
-        Ok(reply) => Ok((reply.value != 0).then(|| reply.detail[1] as u16)),
-        Err(LinkError::Refused { .. }) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
+/// Number of the correction in use and the SENS/AVG that it is for, if one is; a board that does not know of corrections has none.
+pub(super) fn correction_in_use(link: &mut Link) -> Result<Option<(u16, u16)>> {
+    let mut ask = |row| {
+        let other = false;
+        match link.ask(Command::GetCorrection { other, row }) {
+            Ok(reply) => Ok((reply.value != 0).then_some(reply.detail)),
+            Err(LinkError::Refused { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    };
+    let Some(first) = ask(0)? else {
+        return Ok(None);
+    };
+    Ok(ask(1)?.map(|second| (first[1] as u16, second[0] as u16)))
 }
 
 /// Refuses what no board can do before one is asked.

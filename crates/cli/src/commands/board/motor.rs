@@ -146,11 +146,28 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
             turning.answered,
             turning.sent
         );
+        if let Some(why) = arguments.drive.missed(&turning, answer.seconds) {
+            say!("{}", imu_stand::text::item("note: ", &why));
+        }
     }
     Ok(())
 }
 
 impl Drive {
+    /// What of a profile did not come about: the ramp bounds how fast the command moves.
+    fn missed(&self, turning: &Turning, seconds: f64) -> Option<String> {
+        let (_, amplitude, period_ms) = (self.shape?, self.amplitude?, self.period_ms?);
+        let asked = (amplitude + self.offset.abs()).min(255);
+        let reached = turning.high.max(-turning.low);
+        let whole = seconds * 1e3 > f64::from(period_ms);
+        (whole && reached < asked / 2).then(|| {
+            format!(
+                "the samples show no command beyond {reached}, and the profile asks for {asked}: {period_ms} ms are too short \
+                 for the ramp or for the samples; a longer --period-ms, or `imu-stand board set motor-limits`"
+            )
+        })
+    }
+
     /// The command that starts it, if it is asked for.
     pub fn command(&self) -> Option<Command> {
         if let Some(duty) = self.duty {

@@ -172,6 +172,6 @@ fn show(outcome: &Outcome) {
     }
     say!("what this sequence cannot tell");
     for what in &outcome.not_identified {
-        say!("{}", text::item("  - ", what));
+        say!("{}", text::item("- ", what));
     }
 }

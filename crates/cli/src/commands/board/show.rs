@@ -50,8 +50,22 @@ pub struct Info {
     pub bias_dps: [f64; 3],
     /// x, y, z.
     pub scale_dps_per_count: [f64; 3],
-    /// Number of the stored correction; null where none is.
-    pub correction: Option<u16>,
+    /// Number of the correction in use; null where none is.
+    correction: Option<u16>,
+    /// Whether the gyros are set as it was made for: else its rates mean nothing.
+    correction_fits: Option<bool>,
+    /// What it was made for, in words.
+    #[serde(skip)]
+    correction_for: String,
+    #[serde(skip)]
+    sens_avg: u16,
+}
+
+/// SENS/AVG in words.
+pub fn gyros_at(sens_avg: u16) -> String {
+    let [filter, range] = sens_avg.to_le_bytes();
+    let range = gyro_range_dps(range).map_or_else(|| "?".to_owned(), |range| range.to_string());
+    format!("{range} deg/s, filter {filter}")
 }
 
 /// Full scale of a gyro by SENS/AVG bits 10:8, deg/s.
@@ -115,7 +129,17 @@ impl Info {
             bias_dps: hello.bias.map(|b| f64::from(b) / Q16),
             scale_dps_per_count: hello.scale.map(|s| f64::from(s) / Q24),
             correction: None,
+            correction_fits: None,
+            correction_for: String::new(),
+            sens_avg: u16::from_le_bytes([hello.gyro_filter, hello.gyro_range]),
         }
+    }
+
+    /// Adds the correction in use: its number, and the SENS/AVG that it is for.
+    pub fn corrected_by(&mut self, in_use: Option<(u16, u16)>) {
+        self.correction = in_use.map(|(number, _)| number);
+        self.correction_fits = in_use.map(|(_, sens_avg)| sens_avg == self.sens_avg);
+        self.correction_for = in_use.map_or_else(String::new, |(_, sens_avg)| gyros_at(sens_avg));
     }
 
     /// For people.
@@ -153,9 +177,15 @@ impl Info {
             1u32 << self.gyro_filter.min(31)
         );
         let _ = writeln!(out, "  acc          {} g", number(self.acc_range_g));
-        if let Some(number) = self.correction {
-            let _ = writeln!(out, "  correction   {number:#06x}, stored");
-        }
+        let _ = match self.correction {
+            Some(number) if self.correction_fits == Some(false) => writeln!(
+                out,
+                "  correction   {number:#06x}, not applied: it is for gyros at {}; `board correct --model` writes one for these",
+                self.correction_for
+            ),
+            Some(number) => writeln!(out, "  correction   {number:#06x}, stored and in use"),
+            None => writeln!(out, "  correction   none in use"),
+        };
         let _ = writeln!(out, "               bias deg/s   scale deg/s/count");
         for ((axis, bias), scale) in ["x", "y", "z"]
             .iter()

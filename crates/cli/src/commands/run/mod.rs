@@ -228,6 +228,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.correct {
         return correct::run(arguments, progress(arguments));
     }
+    let Span(_, traced) = arguments.vcd_span;
+    if arguments.vcd.is_some() && traced > arguments.seconds {
+        misused!(
+            help = "trace a part of the run, or take a longer one by --seconds",
+            "--vcd-span ends at {traced} s, and the run at {} s",
+            arguments.seconds
+        );
+    }
     let board = board(arguments)?;
     Outputs::beside(&arguments.model)
         .simulated("--out", Some(&arguments.out))?
@@ -271,6 +279,13 @@ fn show(arguments: &Arguments, record: &Record, link: &LinkCounts, found: &Answe
     lines.iter().for_each(|line| say!("    {line}"));
     if let Some(page) = &arguments.report {
         say!("report: {}", page.display());
+    }
+    if let Some(traces) = &arguments.vcd {
+        let Span(from, to) = arguments.vcd_span;
+        say!(
+            "traces of the pins from {from} to {to} s: {}",
+            traces.display()
+        );
     }
 }
 

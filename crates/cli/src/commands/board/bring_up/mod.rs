@@ -136,7 +136,7 @@ const SCOPE: [(&str, &str); 10] = [
     ("OC2 and direction at a reversal", "3 ms of rest between"),
     (
         "OC2 against PD2 as the motor's stop is pressed",
-        "low 0.11 ms behind the first edge at the latest",
+        "low 12 us behind the first edge at the latest",
     ),
     ("bridge's supply at a reversal", "no spike above its rating"),
     ("5 V rail while the motor starts", "4.75 V or more"),
@@ -149,7 +149,7 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     fuses(arguments, &mut steps);
     let hello = session.link.ask_hello()?;
     let mut info = Info::of(&hello, session.link.name());
-    info.correction = super::stored_correction(&mut session.link)?;
+    info.corrected_by(super::correction_in_use(&mut session.link)?);
     set_up(&hello, &mut steps);
     stop_let_go(&mut session.link, &mut steps)?;
     listened(&mut session.link, &hello, &mut steps)?;
