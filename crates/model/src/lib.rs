@@ -24,6 +24,7 @@ pub mod parameter;
 mod range;
 pub mod record;
 pub mod simulate;
+pub mod tone;
 pub mod unnamed;
 
 pub use file::ModelFile;

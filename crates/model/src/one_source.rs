@@ -6,6 +6,7 @@
 //! half width h in white noise, k times as high as that, the best estimate is a Lorentzian filter of half width h sqrt(1 + k) either
 //! way in time (Wiener), where its image at negative frequencies is far away.
 
+mod by_phase;
 mod reading;
 
 use std::f64::consts::TAU;
@@ -14,6 +15,8 @@ use crate::effect::{ParameterSpec, Parameters, optional};
 use crate::effects::correlated_noise::WITH;
 use crate::parameter::Parameter;
 use crate::simulate::Simulation;
+use by_phase::ByPhase;
+pub use by_phase::Wander;
 use reading::{Read, read_from};
 
 /// Phases by the axis that they are counted from.
@@ -128,10 +131,19 @@ pub struct Felt {
 }
 
 /// The oscillation of a centre and a half width, rad per sample, that channels read, each with the phase by which the oscillation is
-/// ahead of it: the best estimate of it, as a simulation makes it, of which the oscillation itself has the standard deviation 1. None
-/// where none of them reads one.
+/// ahead of it: the best estimate of it, as a simulation makes it, of which the oscillation itself has the standard deviation 1. Of a
+/// tone of which it is known how it wanders, by its phase. None where none of them reads one.
 #[must_use]
-pub fn read(channels: &[(&[f64], f64)], omega: f64, half_width: f64) -> Option<Vec<f64>> {
+pub fn read(
+    channels: &[(&[f64], f64)],
+    omega: f64,
+    half_width: f64,
+    wander: Option<Wander>,
+) -> Option<Vec<f64>> {
+    if let Some(told) = wander.and_then(|w| ByPhase::new(channels, w)) {
+        let samples = channels.first().map_or(0, |c| c.0.len());
+        return Some(told.expected(samples).iter().map(|z| z[0]).collect());
+    }
     let all = channels.iter();
     let all = all.filter_map(|(values, phase)| Read::new(values, *phase, omega, half_width));
     let all: Vec<Read<'_>> = all.collect();
@@ -207,7 +219,7 @@ impl Simulation {
     /// What an oscillation of an axis, centre and full width in Hz, has in common with that of another one, the nearest to its
     /// centre; all of it is its own where it says nothing of another, or that has none.
     pub(crate) fn split(
-        &self,
+        &mut self,
         axis: usize,
         [center_hz, width_hz]: [f64; 2],
         parameters: &Parameters,
@@ -223,6 +235,9 @@ impl Simulation {
             }
         }
         let [omega, width] = [center_hz, width_hz].map(|f| TAU * f / self.rate_hz);
+        if let Some(split) = self.split_by_phase(omega, &read, parameters) {
+            return split;
+        }
         let read = read.iter().filter_map(|(k, r, phase)| {
             Some((*r, Read::new(&self.acc[k % 3], *phase, omega, 0.5 * width)?))
         });
@@ -243,5 +258,28 @@ impl Simulation {
             unread: None,
             shared: vec![],
         }
+    }
+
+    /// What a tone of an angular frequency has of that of accelerometers, each with its coherence and phase, where it is known how it
+    /// wanders and they tell its phase.
+    fn split_by_phase(
+        &mut self,
+        omega: f64,
+        read: &[(usize, f64, f64)],
+        parameters: &Parameters,
+    ) -> Option<Split> {
+        let value = |name: &str| parameters.get(name).map(|p| p.value);
+        let wander = Wander {
+            omega,
+            rms: TAU * value("pitch_rms")? / self.rate_hz,
+            time: value("pitch_time")? * self.rate_hz,
+        };
+        let channels = read
+            .iter()
+            .map(|(k, _, phase)| (self.acc[k % 3].as_slice(), *phase));
+        let told = ByPhase::new(&channels.collect::<Vec<_>>(), wander)?;
+        let turning = told.drawn(self.samples, || self.normal());
+        let coherence = read.iter().map(|r| r.1).sum::<f64>() / read.len() as f64;
+        Some(Split::new(coherence, 0.0, &turning))
     }
 }

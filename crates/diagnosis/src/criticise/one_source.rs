@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use model::effect::{Parameters, Peak, Signal};
 use model::effects::effect;
-use model::one_source;
+use model::one_source::{self, Wander};
 use model::record::Quantity;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -43,6 +43,7 @@ struct Band {
     /// Of a tone that was tracked: its phase, and the peak that it has by what was told of it.
     path: Option<Arc<Path>>,
     told: Option<Peak>,
+    wander: Option<Wander>,
 }
 
 impl Band {
@@ -117,9 +118,14 @@ impl OneSource {
             let own = signals.clone().find(|s| s.name == a.name)?;
             Some((own.values.as_slice(), a.phase.0))
         });
-        let z = one_source::read(&read.collect::<Vec<_>>(), omega, half_width)?;
-        let planner = &mut FftPlanner::new();
         let first = self.members.first()?;
+        let z = one_source::read(
+            &read.collect::<Vec<_>>(),
+            omega,
+            half_width,
+            first.band.wander,
+        )?;
+        let planner = &mut FftPlanner::new();
         let (z, own) = (
             transformed(&z, planner),
             transformed(&first.band.seen(s), planner),
@@ -219,6 +225,7 @@ fn bands(axis: usize, s: &Searched<'_>) -> Vec<Band> {
             half_width: peak.half_width,
             path: t.path.clone(),
             told,
+            wander: wander(t),
         })
     });
     all.collect()
@@ -234,6 +241,18 @@ fn told(t: &Term, white: f64) -> Option<Peak> {
         omega: *omega,
         half_width: *half_width,
         variance: 0.5 * amplitude * amplitude / white,
+    })
+}
+
+/// How a tone that was tracked wanders.
+fn wander(t: &Term) -> Option<Wander> {
+    let [_, (omega, _), _, (rms, _), (time, _)] = t.stated.as_deref()? else {
+        return None;
+    };
+    Some(Wander {
+        omega: *omega,
+        rms: *rms,
+        time: *time,
     })
 }
 

@@ -223,16 +223,17 @@ impl Moves {
 pub(crate) fn coherence(own: &[f64], there: &[f64]) -> (f64, f64) {
     let planner = &mut FftPlanner::new();
     let own = envelope_of(own, planner);
-    coherent(&own, &envelope_of(there, planner), planner)
+    let (p, part, _) = coherent(&own, &envelope_of(there, planner), planner);
+    (p, part)
 }
 
-/// The same of two envelopes. With phases at random (Theiler et al., 1992) each frequency adds its own energy to that of the sum of
+/// The same of two envelopes, and at how many frequencies they have their energy. With phases at random (Theiler et al., 1992) each frequency adds its own energy to that of the sum of
 /// all, which is then exponential.
 fn coherent(
     own: &[Complex<f64>],
     there: &[Complex<f64>],
     planner: &mut FftPlanner<f64>,
-) -> (f64, f64) {
+) -> (f64, f64, f64) {
     let fft = planner.plan_fft_forward(own.len());
     let [own, there] = [own, there].map(|z| {
         let mut spectrum = z.to_vec();
@@ -250,6 +251,7 @@ fn coherent(
     (
         (-sum.norm_sqr() / at_random.max(f64::MIN_POSITIVE)).exp(),
         part,
+        both / at_random.max(f64::MIN_POSITIVE),
     )
 }
 
@@ -273,8 +275,12 @@ pub(super) fn is_read(own: &Moves, signals: &[Signal], felt: &[(&str, Vec<f64>)]
             return false;
         }
         let there = envelope_of(&coefficients[own.places.clone()], planner);
-        let (p, part) = coherent(&own.envelope, &there, planner);
-        p < CheckId::BandSource.level() && part > FOLLOWED && shakes(own, coefficients, part)
+        let (p, part, count) = coherent(&own.envelope, &there, planner);
+        // Of a few frequencies that nearly agree: phases at random do so in fewer than this part, each but the first by one coordinate.
+        let agree = (1.0 - part).max(0.0).powf(0.5 * (count - 1.0));
+        p.min(agree) < CheckId::BandSource.level()
+            && part > FOLLOWED
+            && shakes(own, coefficients, part)
     })
 }
 
@@ -321,7 +327,7 @@ pub(super) fn claim(
     }
     for (name, coefficients) in felt {
         let there = envelope_of(&coefficients[own.places.clone()], planner);
-        let (p, part) = coherent(&own.envelope, &there, planner);
+        let (p, part, _) = coherent(&own.envelope, &there, planner);
         let mut named = signals.iter().filter(|s| s.name == *name);
         let of_acceleration = named.any(|s| s.quantity == Quantity::Acc);
         if of_acceleration && shakes(own, coefficients, part) {

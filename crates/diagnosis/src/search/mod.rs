@@ -19,7 +19,7 @@ mod rivals;
 mod score;
 pub(crate) mod searched;
 mod stretch;
-mod tracked;
+pub(crate) mod tracked;
 
 use std::cell::RefCell;
 use std::collections::HashMap;

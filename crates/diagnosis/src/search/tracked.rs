@@ -5,6 +5,8 @@
 //! beside the other. Where the phase can be told block by block ([`phase`]) and the tone does better than all of these together, it
 //! takes their place, the record is searched again without it, and the name stands if nothing is left there.
 
+mod claims;
+mod led;
 mod phase;
 
 use std::f64::consts::PI;
@@ -17,16 +19,17 @@ use rustfft::num_complex::Complex;
 
 use super::Search;
 use crate::fit::channel::{Form, Path, State, Term};
-use crate::fit::likelihood::Noise;
 use crate::fit::scan::residual;
 use crate::fit::threshold;
-use crate::test_level::{CheckId, Outcome};
+use claims::claim;
+pub(crate) use led::Lead;
 use numerics::column::dot;
+use numerics::order_statistics::median;
 use numerics::tails;
 use phase::{FORGOTTEN, Tracked, tracked};
 
-/// Most tones that are tracked on one channel: a hum and two harmonics of it.
-const MOST_TONES: usize = 3;
+/// Most tones that are tracked on one channel: a hum or a rotor, and harmonics of it.
+const MOST_TONES: usize = 5;
 /// Half widths of a peak, either side, that its tone is sought in: a normal law of that half width at half power ends at 3.5 of its
 /// standard deviations.
 const REACH: f64 = 3.0;
@@ -44,16 +47,12 @@ const MARGIN: f64 = 8.0;
 const LARGEST_DOUBT: f64 = 0.1;
 /// Correlation times of the pitch in the record, at least: fewer do not tell a process from a course.
 const LEAST_TIMES: f64 = 3.0;
-/// Relative variance of the size that real tones have beside chance, as the envelope's of a band.
-const UNEVEN: f64 = 0.025;
-/// Part of the surprises' variance that one frequency, or what neighbours share, may hold.
-const TOLERATED: f64 = 0.1;
 /// Relative step of a derivative.
 const STEP: f64 = 0.01;
-/// Blocks at either end that are not asked.
-const ENDS: usize = 3;
-/// Lags of the portmanteau statistic.
-const LAGS: usize = 10;
+
+/// Amplitude, frequency, half width, rms of the pitch and its time, each with its error; frequencies in rad per sample, the time in
+/// samples.
+type Stated = [(f64, f64); 5];
 
 /// Terms about one place, and the angular frequencies that they reach over, rad per sample.
 struct Place {
@@ -68,8 +67,17 @@ struct TrackedTone {
     course: Vec<f64>,
     /// Nats by which it is ahead of what was laid there.
     lead: f64,
+    /// Whether another one leads it, and nats that are then left of it by a phase that is in doubt.
+    is_led: bool,
+    left: f64,
     from: f64,
     to: f64,
+}
+
+impl TrackedTone {
+    fn ahead(&self) -> f64 {
+        self.lead - self.left
+    }
 }
 
 /// A tone that was looked for over one reach: in blocks of that length, about an angular frequency, in noise of that density.
@@ -113,14 +121,21 @@ impl Place {
 }
 
 impl Search<'_> {
-    /// The state in which tones that can be tracked stand for the lines and bands that were laid on them; `again` searches the data
-    /// as they are.
+    /// The state in which tones that can be tracked, or are led by those of other channels, stand for the lines and bands that were laid
+    /// on them; `again` searches the data as they are.
     #[must_use]
-    pub fn beside_tracked_tones(&self, mut state: State, again: &dyn Fn() -> State) -> State {
+    pub(crate) fn beside_tracked_tones(
+        &self,
+        mut state: State,
+        leads: &[Lead],
+        again: &dyn Fn() -> State,
+    ) -> State {
+        let mut leads = leads.to_vec();
+        let mut refused: Vec<(f64, f64)> = vec![];
         let mut tones: Vec<TrackedTone> = vec![];
         let mut course = vec![0.0; self.panel.bins.n];
         while tones.len() < MOST_TONES {
-            let next = || self.next_tone(&state);
+            let next = || self.next_tone(&state, &leads, &refused);
             let found = match tones.is_empty() {
                 true => next(),
                 false => self.panel.without(&course, next),
@@ -132,10 +147,16 @@ impl Search<'_> {
             let left = places(&rest, self.spacing());
             let any = |s: &State| s.terms.iter().any(Term::is_any_spectrum);
             let same_place = left.iter().any(|p| p.to > tone.from && p.from < tone.to);
+            if same_place && tone.is_led {
+                // A phase in doubt leaves something of a strong one, which may lead itself.
+                refused.push((tone.from, tone.to));
+                continue;
+            }
             if same_place || (any(&rest) && !any(&state)) {
                 break;
             }
             (state, course) = (rest, more);
+            leads.extend(Lead::of(&tone.term));
             tones.push(tone);
         }
         if tones.is_empty() {
@@ -172,8 +193,14 @@ impl Search<'_> {
         state
     }
 
-    /// The strongest tone that can be tracked through what was laid about one place.
-    fn next_tone(&self, state: &State) -> Option<TrackedTone> {
+    /// The strongest tone that can be tracked through what was laid about one place; those that lie where some were `refused` lead
+    /// themselves.
+    fn next_tone(
+        &self,
+        state: &State,
+        leads: &[Lead],
+        refused: &[(f64, f64)],
+    ) -> Option<TrackedTone> {
         let all = places(state, self.spacing());
         let split = |p: &&Place| p.terms.len() > 1 || state.terms[p.terms[0]].is_band();
         let mut found: Vec<TrackedTone> = vec![];
@@ -184,16 +211,26 @@ impl Search<'_> {
             }
             found.extend(self.widest(state, place, &all));
         }
-        let strongest = found.into_iter().filter(|t| t.lead > MARGIN);
-        strongest.max_by(|a, b| a.term.lr.total_cmp(&b.term.lr))
+        let free = |t: &TrackedTone| !refused.iter().any(|r| r.1 > t.from && r.0 < t.to);
+        found.extend(self.led(state, &all, leads).into_iter().filter(free));
+        found.retain(|t| t.lead > MARGIN);
+        let best_there = |t: &TrackedTone| {
+            let there = found.iter().filter(|o| o.to > t.from && o.from < t.to);
+            there.map(TrackedTone::ahead).fold(f64::MIN, f64::max) <= t.ahead()
+        };
+        let strongest = found.iter().enumerate().filter(|(_, t)| best_there(t));
+        let strongest = strongest.max_by(|(_, a), (_, b)| a.term.lr.total_cmp(&b.term.lr));
+        let place = strongest.map(|(i, _)| i)?;
+        Some(found.swap_remove(place))
     }
 
     /// The tone about a place, over as much about it as tells more of it.
     fn widest(&self, state: &State, place: &Place, all: &[Place]) -> Option<TrackedTone> {
         let mut tries: Vec<Attempt> = vec![];
+        let density = self.density_about(state, &place.wider(f64::from(1 << MOST_DOUBLED), all));
         for doubled in 0..MOST_DOUBLED {
             let wider = place.wider(f64::from(1 << doubled), all);
-            let Some(attempt) = self.attempt(state, wider) else {
+            let Some(attempt) = self.attempt(state, wider, density) else {
                 continue;
             };
             let before = tries.last().map_or(f64::MIN, |t| t.seen.nats);
@@ -202,25 +239,42 @@ impl Search<'_> {
             }
             tries.push(attempt);
         }
-        // A phase that is a random walk has the Lorentzian of a band, by which it is told as well as by its course.
-        let best = tries.last().filter(|t| t.seen.at[2] > FORGOTTEN.ln())?;
-        // Long blocks show a departure of the pitch best.
-        let first = tries
-            .iter()
-            .find(|t| t.seen.nats > ALL_OF_IT * best.seen.nats)?;
+        // A phase that is a random walk has the Lorentzian of a band, by which it is told as well as by its course, but
+        // for what is locked to it.
+        let is_course = |t: &&Attempt| t.seen.at[2] > FORGOTTEN.ln() || has_multiple(place, all);
+        let best = tries.last().filter(is_course)?;
+        // Long blocks show a departure of the pitch best; of its memory, those over which it turns the phase by less than noise does: a
+        // block tells the mean of the phase.
+        let all = |t: &&Attempt| t.seen.nats > ALL_OF_IT * best.seen.nats;
+        let points = |t: &&Attempt| t.seen.turned < t.seen.noise / t.seen.at[0].exp().powi(2);
+        let long = tries.iter().find(all)?;
+        let short = tries.iter().filter(all).find(points).unwrap_or(best);
         let mut term = self.term(best)?;
-        term.claims.push(claim(&first.seen));
+        term.claims.push(claim(&long.seen, Some(&short.seen)));
         Some(TrackedTone {
             course: best.path().course(self.panel.bins.n),
             term,
             lead: best.lead,
+            is_led: false,
+            left: 0.0,
             from: best.place.from,
             to: best.place.to,
         })
     }
 
+    /// Density of the noise about a place many times as wide as what lies there, by the median of what its terms leave: lines and
+    /// bands laid on a tone have skirts, which take from what the fit says of the noise beside them.
+    fn density_about(&self, state: &State, place: &Place) -> f64 {
+        let n = self.panel.bins.n;
+        let to_k = n as f64 / PI;
+        let from = (place.from * to_k).max(1.0) as usize;
+        let to = ((place.to * to_k) as usize).min(n);
+        let others = without_others(self, state, &place.terms);
+        density(&others[from..to])
+    }
+
     /// The tone in a place, where its phase can be told.
-    fn attempt(&self, state: &State, place: Place) -> Option<Attempt> {
+    fn attempt(&self, state: &State, place: Place, density: f64) -> Option<Attempt> {
         let n = self.panel.bins.n;
         let to_k = n as f64 / PI;
         // Neither a slow process nor what half the sample rate turns back.
@@ -235,8 +289,6 @@ impl Search<'_> {
             return None;
         }
         let middle = (from + count) as f64 / to_k;
-        let beside = Self::beside(state, &place.terms);
-        let density = state.solution.white * beside.at(middle);
         let others = without_others(self, state, &place.terms);
         let blocks = turned_back(&others[from..from + 2 * count], middle, n);
         let length = n as f64 / count as f64;
@@ -247,7 +299,7 @@ impl Search<'_> {
             return None;
         }
         Some(Attempt {
-            lead: seen.nats - self.laid(state, &place, &beside),
+            lead: seen.nats - self.laid(state, &place, density, &others),
             seen,
             middle,
             length,
@@ -256,47 +308,28 @@ impl Search<'_> {
         })
     }
 
-    /// Nats by which the terms of a place are ahead of none, about it.
-    fn laid(&self, state: &State, place: &Place, beside: &Noise) -> f64 {
+    /// Nats by which the terms of a place are ahead of noise of a density, about it; `without` them is what the others leave.
+    fn laid(&self, state: &State, place: &Place, density: f64, without: &[f64]) -> f64 {
         let n = self.panel.bins.n;
         let half = place.to - place.from;
         let to_k = n as f64 / PI;
         let from = ((place.from - half) * to_k).max(1.0) as usize;
         let to = (((place.to + half) * to_k) as usize).min(n);
-        let omega = || (from..to).map(|k| k as f64 / to_k);
         let with = residual(&self.panel, &state.columns(), &state.solution);
-        let without = without_others(self, state, &place.terms);
-        let white = state.solution.white;
-        let nats = |r: &[f64], noise: &Noise| -> f64 {
-            let each = r[from..to].iter().zip(noise.through(omega()));
-            each.map(|(r, g)| -0.5 * (r * r / (white * g) + g.ln()))
-                .sum()
-        };
-        nats(&with, &state.noise) - nats(&without, beside)
+        let noise = state.noise.through((from..to).map(|k| k as f64 / to_k));
+        let nats = |r: f64, g: f64| -0.5 * (r * r / g + g.ln());
+        let all = with[from..to].iter().zip(&without[from..to]).zip(noise);
+        all.map(|((r, o), g)| nats(*r, state.solution.white * g) - nats(*o, density))
+            .sum()
     }
 
-    /// The term of a tone.
+    /// The term of a tone that was tracked.
     fn term(&self, of: &Attempt) -> Option<Term> {
-        let mode = self.candidates.iter().find_map(|c| match &c.hypothesis {
-            Hypothesis::Covariance(c) if c.is_peak() => Some(Arc::clone(c)),
-            _ => None,
-        })?;
-        let number = (self.candidates.iter())
-            .position(|c| matches!(c.hypothesis, Hypothesis::WanderingTone))?;
         let (seen, block) = (&of.seen, of.length);
         let [amplitude, pitch, time] = [seen.at[0], seen.at[1], seen.at[2]].map(f64::exp);
         let (pitch, time) = (pitch / block, time * block);
         let omega = of.middle + seen.at[3] / block;
         let half = 0.5 * wandering_line::width_at_half_power(pitch, time);
-        let peak = Peak {
-            omega,
-            half_width: half.max(2.0 * self.spacing()),
-            variance: 0.5 * amplitude * amplitude / of.density,
-        };
-        let (form, theta) = mode.about(&peak)?;
-        let limit = threshold::peak(self.panel.bins.n);
-        let effect = self.candidates[number].effect;
-        let mut term = Term::new(effect, number, Form::Covariance(form, theta), limit);
         let error = |of: [f64; 4]| {
             let along = |row: &Vec<f64>| dot(row, &of);
             let rows = seen.covariance.iter().zip(of);
@@ -315,17 +348,51 @@ impl Search<'_> {
             (width(pitch, time * by) - width(pitch, time)) / by.ln(),
             0.0,
         ];
-        term.stated = Some(vec![
+        let stated = [
             (amplitude, amplitude * error(unit(0))),
             (omega, error(unit(3)) / block),
             (half, half * error(of_width)),
             (pitch, pitch * error(unit(1))),
             (time, time * error(unit(2))),
-        ]);
-        term.path = Some(Arc::new(of.path()));
-        term.lr = 2.0 * seen.nats;
+        ];
+        self.described(stated, &Arc::new(of.path()), of.density, seen.nats)
+    }
+
+    /// The term of a tone of a path, in noise of a density, which is so many nats ahead of none.
+    fn described(&self, stated: Stated, path: &Arc<Path>, density: f64, nats: f64) -> Option<Term> {
+        let mode = self.candidates.iter().find_map(|c| match &c.hypothesis {
+            Hypothesis::Covariance(c) if c.is_peak() => Some(Arc::clone(c)),
+            _ => None,
+        })?;
+        let number = (self.candidates.iter())
+            .position(|c| matches!(c.hypothesis, Hypothesis::WanderingTone))?;
+        let [(amplitude, _), (omega, _), (half, _), ..] = stated;
+        let peak = Peak {
+            omega,
+            half_width: half.max(2.0 * self.spacing()),
+            variance: 0.5 * amplitude * amplitude / density,
+        };
+        let (form, theta) = mode.about(&peak)?;
+        let limit = threshold::peak(self.panel.bins.n);
+        let effect = self.candidates[number].effect;
+        let mut term = Term::new(effect, number, Form::Covariance(form, theta), limit);
+        term.stated = Some(stated.to_vec());
+        term.path = Some(Arc::clone(path));
+        term.lr = 2.0 * nats;
         Some(term)
     }
+}
+
+/// Whether a place lies at a multiple of another one, or another one at a multiple of it.
+fn has_multiple(place: &Place, all: &[Place]) -> bool {
+    let middle = |p: &Place| 0.5 * (p.from + p.to);
+    let near = |a: &Place, b: &Place| {
+        led::RATIOS.iter().any(|(of, to)| {
+            let ratio = f64::from(*of) / f64::from(*to);
+            of != to && (led::folded(ratio * middle(a)).0 - middle(b)).abs() < 0.5 * (b.to - b.from)
+        })
+    };
+    all.iter().any(|o| near(place, o) || near(o, place))
 }
 
 /// The places of lines and bands.
@@ -360,6 +427,12 @@ fn places(state: &State, spacing: f64) -> Vec<Place> {
     all
 }
 
+/// Density of the noise among coefficients of which a few hold more.
+fn density(coefficients: &[f64]) -> f64 {
+    let energies: Vec<f64> = coefficients.iter().map(|c| c * c).collect();
+    median(&energies) / tails::MEDIAN
+}
+
 /// The coefficients without the terms that are not among some.
 fn without_others(search: &Search<'_>, state: &State, these: &[usize]) -> Vec<f64> {
     let panel = &search.panel;
@@ -384,71 +457,4 @@ fn turned_back(coefficients: &[f64], middle: f64, n: usize) -> Vec<Complex<f64>>
     let signs = [-first, first].into_iter().cycle();
     let values = z[1..z.len() / 2].iter().zip(signs);
     values.map(|(z, by)| z * by).collect()
-}
-
-/// What the name claims: the pitch knows nothing of its past but what its law says, has no rhythm and does not jump, and the size is
-/// steady.
-fn claim(seen: &Tracked) -> Outcome {
-    // What lies beyond the ends of the record is not known, and rings.
-    let within = |v: &Vec<f64>| -> Vec<f64> { v[ENDS..v.len() - ENDS].to_vec() };
-    let [across, along] = &seen.surprises.each_ref().map(within);
-    let count = across.len() as f64;
-    let mean = |v: &[f64], k: i32| v.iter().map(|v| v.powi(k)).sum::<f64>() / v.len() as f64;
-    // Beside chance, of which the variance of a variance is 2 / n, a real size moves; along the phase the noise has the variance 1.
-    let amplitude = seen.at[0].exp();
-    let room = UNEVEN * amplitude * amplitude / seen.noise;
-    let size = (mean(along, 2) - 1.0) / (2.0 / count).sqrt().hypot(room);
-    let kurtosis = mean(across, 4) / mean(across, 2).powi(2);
-    let jumps = tails::kurtosis_score(kurtosis, count);
-    let energy = mean(across, 2) * count;
-    let lag = |k: usize| {
-        across
-            .iter()
-            .zip(&across[k..])
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
-            / energy
-    };
-    let squares: Vec<f64> = (1..=LAGS).map(|k| lag(k).powi(2)).collect();
-    let shared: f64 = squares.iter().sum();
-    let past = match shared > TOLERATED * TOLERATED {
-        true => tails::chi_square(shared * count, LAGS as f64),
-        false => 1.0,
-    };
-    let chances = [
-        ("its size is not steady", tails::upper_normal(size)),
-        ("its pitch jumps", tails::upper_normal(jumps)),
-        ("its pitch has a rhythm", rhythm(across)),
-        ("its pitch stays otherwise than a process of one time", past),
-    ];
-    let (what, least) = (chances.iter())
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .copied()
-        .unwrap_or(("", 1.0));
-    Outcome {
-        id: CheckId::BandEnvelope,
-        about: vec![],
-        statistic: (mean(along, 2) - 1.0) * seen.noise / (amplitude * amplitude),
-        p_value: (least * chances.len() as f64).min(1.0),
-        what: format!(
-            "told as wandering_line, of which the phase was tracked through the record: farthest from the law of such a tone: {what}"
-        ),
-    }
-}
-
-/// Chance of the strongest frequency of a series that is white (Fisher, 1929); 1 where it holds no more than is tolerated.
-fn rhythm(series: &[f64]) -> f64 {
-    let mut z: Vec<Complex<f64>> = series.iter().map(|v| Complex::new(*v, 0.0)).collect();
-    FftPlanner::new().plan_fft_forward(z.len()).process(&mut z);
-    let energies: Vec<f64> = z[1..z.len().div_ceil(2)]
-        .iter()
-        .map(Complex::norm_sqr)
-        .collect();
-    let all: f64 = energies.iter().sum();
-    let share = energies.iter().copied().fold(0.0, f64::max) / all;
-    if share < TOLERATED {
-        return 1.0;
-    }
-    let count = energies.len() as f64;
-    (count * (1.0 - share).powf(count - 1.0)).min(1.0)
 }
