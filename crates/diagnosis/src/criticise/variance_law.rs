@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 use model::effect::{Effect, Found, Hypothesis, VarianceLaw};
 
+use statrs::distribution::{ContinuousCDF, Normal};
+
 use crate::fit::channel::{VarianceFound, VarianceLaws, divide, over_mean};
 use crate::fit::{scan, threshold};
 use crate::search::searched::Searched;
@@ -56,16 +58,49 @@ fn beside(e: &[f64], each: &[VarianceFound], but: Option<usize>) -> Vec<f64> {
     e
 }
 
-/// The best law of the variance of a residual by one of some effects, if one passes its threshold.
+/// Variance of the squares of a noise over that of normal values, from which on it has tails of its own.
+const TAILED: f64 = 1.1;
+
+/// Whether a residual that a law divides has tails of its own: then a few far readings are likelier louder than they are far.
+fn is_tailed(e: &[f64], law: &[f64]) -> bool {
+    let squares = || e.iter().zip(law).map(|(e, v)| e * e / v);
+    let n = e.len() as f64;
+    let mean = squares().sum::<f64>() / n;
+    let kurtosis = squares().map(|s| s * s).sum::<f64>() / n / (mean * mean);
+    0.5 * (kurtosis - 1.0) > TAILED
+}
+
+/// The normal values of the same order (van der Waerden, 1952): a stretch that is louder is so among them, too, and far readings are
+/// no farther than normal ones.
+fn normal_scores(e: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..e.len()).collect();
+    order.sort_unstable_by(|a, b| e[*a].total_cmp(&e[*b]));
+    let normal = Normal::standard();
+    let mut scores = vec![0.0; e.len()];
+    for (rank, i) in order.into_iter().enumerate() {
+        scores[i] = normal.inverse_cdf((rank as f64 + 0.5) / e.len() as f64);
+    }
+    scores
+}
+
+/// The best law of the variance of a residual by one of some effects, if one passes its threshold; of a noise with tails, by normal
+/// scores as well.
 fn best(s: &Searched<'_>, e: &[f64], asked: &dyn Fn(&str) -> bool) -> Option<VarianceFound> {
     let candidates = s.search.candidates.iter();
+    let mut scores: Option<Vec<f64>> = None;
     let offers = candidates.filter(|c| asked(c.effect.id())).filter_map(|c| {
         let Hypothesis::Variance(law) = &c.hypothesis else {
             return None;
         };
-        Some(offer(s, e, c.effect, law))
+        let told = offer(s, e, c.effect, law);
+        let passes = told.lr > told.threshold
+            && (!is_tailed(e, &told.law) || {
+                let scores = scores.get_or_insert_with(|| normal_scores(e));
+                offer(s, scores, c.effect, law).lr > told.threshold
+            });
+        passes.then_some(told)
     });
-    let mut all: Vec<VarianceFound> = offers.filter(|v| v.lr > v.threshold).collect();
+    let mut all: Vec<VarianceFound> = offers.collect();
     let score = |v: &VarianceFound| v.lr - v.threshold;
     all.sort_by(|a, b| score(b).total_cmp(&score(a)));
     let (best, rest) = all.split_first_mut()?;
