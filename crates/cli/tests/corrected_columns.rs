@@ -69,6 +69,14 @@ fn columns_are_added_where_corrected_frames_arrive_and_nothing_where_not() {
         record.channel("corrected_state").is_none(),
         "no measurement"
     );
+    // Rates of a correction that is not applied mean nothing, and are none.
+    builder.corrected(&Corrected { state: 0, ..of(3) });
+    let without = text(&builder);
+    let last = without.lines().last().unwrap();
+    assert!(
+        last.ends_with(",0,,,,48879,0,1073741824,-5,0,536870912,7"),
+        "{last}"
+    );
     // Of a firmware that has no attitude.
     let mut builder = RecordBuilder::new(Calibration::default());
     builder.push(&sample(0), 0.0);

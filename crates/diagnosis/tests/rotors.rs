@@ -16,9 +16,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 type Rng = Xoshiro256PlusPlus;
 
 const RUNS: u64 = 12;
-/// Of 11 records like these, drawn by another program before this one was written, 8 were right: of 12 of that share fewer than this are
-/// right once in 60 times.
-const LEAST: u64 = 6;
+/// A share of 0.95 misses this in 2 %. Of two seeds that were not seen before (31, 47) 23 of 24 are right (2026-11-28).
+const LEAST: u64 = 10;
 const SECONDS: f64 = 600.0;
 const ACC_NOISE: f64 = 3e-3;
 

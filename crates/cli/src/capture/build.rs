@@ -321,7 +321,11 @@ impl RecordBuilder {
             rows.map(|row| row.corrected.as_ref().map(of)).collect()
         };
         let rates = [0, 1, 2].map(|axis| {
-            let counts = counts(&|c| c.rate[axis]);
+            // A correction that is not applied, as it is for gyros set up otherwise, makes rates that mean nothing.
+            let applied = |c: &&Corrected| c.state & wire::correction_state::APPLIED != 0;
+            let rows = self.rows.iter();
+            let rate = |row: &Row| Some(row.corrected.as_ref().filter(applied)?.rate[axis]);
+            let counts: Vec<Option<i32>> = rows.map(rate).collect();
             let scale = (0.0, CORRECTED_LSB_DPS);
             in_counts(CORRECTED[axis], Quantity::Derived, "deg/s", scale, &counts)
         });
