@@ -114,13 +114,17 @@ fn felt(finding: &Finding) -> Option<String> {
         1 => "it",
         _ => "them",
     };
-    let read = match others.is_empty() {
-        true => String::new(),
-        false => format!(", which {} read too", others.join(", ")),
+    let read = match others[..] {
+        [] => String::new(),
+        [one] => format!(", which {one} reads too"),
+        _ => format!(", which {} read too", others.join(", ")),
     };
-    let least = without_error(least);
+    let coherence = match without_error(least).as_str() {
+        "1" => "1".to_owned(),
+        least => format!("at least {least}"),
+    };
     Some(format!(
-        "One source shakes {shaken}{read}: coherence {least} and more."
+        "One source shakes {shaken}{read}: coherence {coherence}."
     ))
 }
 

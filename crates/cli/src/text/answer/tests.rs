@@ -136,14 +136,14 @@ fn what_is_otherwise_on_other_channels_is_said_and_what_feels_the_same() {
         parameters: sizes(0.03, "with_acc_y"),
         ..finding("narrow_band", &[])
     };
-    let alone = "One source shakes it, which acc_y read too: coherence 0.97 and more.";
+    let alone = "One source shakes it, which acc_y reads too: coherence at least 0.97.";
     assert_eq!(elsewhere(&f).as_deref(), Some(alone));
     f.channels.push("gyro_z".into());
     f.per_channel = BTreeMap::from([
         ("gyro_x".to_owned(), f.parameters.clone()),
         ("gyro_z".to_owned(), sizes(0.05, "with_gyro_x")),
     ]);
-    let both = "That is on gyro_x; on gyro_z rms 0.0500 deg/s (95\u{a0}%: 0.0480 to 0.0520). One source shakes them, which acc_y read too: coherence 0.97 and more.";
+    let both = "That is on gyro_x; on gyro_z rms 0.0500 deg/s (95\u{a0}%: 0.0480 to 0.0520). One source shakes them, which acc_y reads too: coherence at least 0.97.";
     assert_eq!(elsewhere(&f).as_deref(), Some(both));
     assert_eq!(elsewhere(&finding("temperature", &[])), None);
 }
