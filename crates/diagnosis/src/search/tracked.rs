@@ -250,7 +250,7 @@ impl Search<'_> {
         let long = tries.iter().find(all)?;
         let short = tries.iter().filter(all).find(points).unwrap_or(best);
         let mut term = self.term(best)?;
-        term.claims.push(claim(&long.seen, Some(&short.seen)));
+        term.claims.push(claim(&long.seen, &short.seen));
         Some(TrackedTone {
             course: best.path().course(self.panel.bins.n),
             term,

@@ -17,31 +17,51 @@ const ENDS: usize = 3;
 /// Lags of the portmanteau statistic.
 const LAGS: usize = 10;
 
-/// What the name claims: the pitch has no rhythm and does not jump, the size is steady, and of a pitch that leads itself, which
-/// `memory` shows, that it knows nothing of its past but what its law says.
-pub(super) fn claim(seen: &Tracked, memory: Option<&Tracked>) -> Outcome {
+/// What the name claims of a tone that leads itself: the pitch has no rhythm and does not jump, the size is steady, and the pitch knows
+/// nothing of its past but what its law says, which `memory` shows.
+pub(super) fn claim(seen: &Tracked, memory: &Tracked) -> Outcome {
     let [across, along] = &seen.surprises.each_ref().map(|s| within_ends(s));
-    let count = across.len() as f64;
-    let mean = |v: &[f64], k: i32| v.iter().map(|v| v.powi(k)).sum::<f64>() / v.len() as f64;
-    // Beside chance, of which the variance of a variance is 2 / n, a real size moves; along the phase the noise has the variance 1.
-    let amplitude = seen.at[0].exp();
-    let room = UNEVEN * amplitude * amplitude / seen.noise;
-    let size = (mean(along, 2) - 1.0) / (2.0 / count).sqrt().hypot(room);
     let kurtosis = mean(across, 4) / mean(across, 2).powi(2);
-    let jumps = tails::kurtosis_score(kurtosis, count);
-    let past = memory.map_or(1.0, |m| portmanteau(&within_ends(&m.surprises[0])));
+    let jumps = tails::kurtosis_score(kurtosis, across.len() as f64);
+    let own = over_noise(seen.at[0].exp(), seen.noise);
+    let past = portmanteau(&within_ends(&memory.surprises[0]));
     let chances = [
-        ("its size is not steady", tails::upper_normal(size)),
+        ("its size is not steady", unsteady(along, own)),
         ("its pitch jumps", tails::upper_normal(jumps)),
         ("its pitch has a rhythm", rhythm(across)),
         ("its pitch stays otherwise than a process of one time", past),
     ];
-    // Of a pitch that another one leads that one tells.
-    let chances = if memory.is_some() {
-        &chances[..]
-    } else {
-        &chances[..1]
-    };
+    farthest(&chances, along, own)
+}
+
+/// The same of one that another tone leads, by its surprises along the phase: that its size is steady. Of the pitch that one tells.
+pub(super) fn claim_of_led(along: &[f64], amplitude: f64, noise: f64) -> Outcome {
+    let (along, own) = (within_ends(along), over_noise(amplitude, noise));
+    farthest(
+        &[("its size is not steady", unsteady(&along, own))],
+        &along,
+        own,
+    )
+}
+
+/// Power of a tone over the variance of the noise in either part of a block.
+fn over_noise(amplitude: f64, noise: f64) -> f64 {
+    amplitude * amplitude / noise
+}
+
+fn mean(v: &[f64], power: i32) -> f64 {
+    v.iter().map(|v| v.powi(power)).sum::<f64>() / v.len() as f64
+}
+
+/// Chance that the size of a tone, of so much power over the noise, moves as much: beside chance, of which the variance of a variance
+/// is 2 / n, a real size does; along the phase the noise has the variance 1.
+fn unsteady(along: &[f64], over_noise: f64) -> f64 {
+    let by_chance = (2.0 / along.len() as f64).sqrt();
+    tails::upper_normal((mean(along, 2) - 1.0) / by_chance.hypot(UNEVEN * over_noise))
+}
+
+/// The claim by the least of some chances.
+fn farthest(chances: &[(&str, f64)], along: &[f64], over_noise: f64) -> Outcome {
     let (what, least) = (chances.iter())
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .copied()
@@ -49,7 +69,7 @@ pub(super) fn claim(seen: &Tracked, memory: Option<&Tracked>) -> Outcome {
     Outcome {
         id: CheckId::BandEnvelope,
         about: vec![],
-        statistic: (mean(along, 2) - 1.0) * seen.noise / (amplitude * amplitude),
+        statistic: (mean(along, 2) - 1.0) / over_noise,
         p_value: (least * chances.len() as f64).min(1.0),
         what: format!(
             "told as wandering_line, of which the phase was tracked through the record: farthest from the law of such a tone: {what}"

@@ -6,10 +6,10 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use numerics::column::dot;
 use rustfft::num_complex::Complex;
 
-use super::claims::claim;
-use super::phase::Tracked;
+use super::claims::claim_of_led;
 use super::{LEAST_BLOCKS, LEAST_REACH, MARGIN, Place, REACH, Stated, TrackedTone, density};
 use super::{turned_back, without_others};
 use crate::fit::channel::{Path, State, Term};
@@ -138,14 +138,9 @@ impl Search<'_> {
         let path = Arc::make_mut(&mut led.path);
         let columns = path.quadratures(n).map(|c| self.panel.dct.forward(&c));
         let [own, across] = [0, 1].map(|k| &columns[k][from..to]);
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (p, q, r) = (
-            product(own, own),
-            product(own, across),
-            product(across, across),
-        );
+        let (p, q, r) = (dot(own, own), dot(own, across), dot(across, across));
         let read = &others[from..to];
-        let (x, y) = (product(own, read), product(across, read));
+        let (x, y) = (dot(own, read), dot(across, read));
         let whole = p * r - q * q;
         let (a, b) = ((r * x - q * y) / whole, (p * y - q * x) / whole);
         let nats = 0.5 * (a * x + b * y) / density;
@@ -188,19 +183,13 @@ impl Search<'_> {
         let length = n as f64 / reach as f64;
         let noise = 2.0 * density / length;
         let size = led.path.amplitude;
-        let each = blocks.iter().enumerate().map(|(k, z)| {
+        let along = blocks.iter().enumerate().map(|(k, z)| {
             let at = (k as f64 + 1.0) * length - 0.5;
             let (phase, doubt) = led.path.at(at);
             let z = z * Complex::from_polar(1.0, turn * at - phase);
-            let across = noise + size * size * doubt;
-            let along = noise + 0.5 * (size * doubt).powi(2);
-            (
-                z.im / across.sqrt(),
-                (z.re - size * (-0.5 * doubt).exp()) / along.sqrt(),
-            )
+            let spread = noise + 0.5 * (size * doubt).powi(2);
+            (z.re - size * (-0.5 * doubt).exp()) / spread.sqrt()
         });
-        let (across, along): (Vec<f64>, Vec<f64>) = each.unzip();
-        let seen = Tracked::led(size, noise, [across, along]);
-        Some(claim(&seen, None))
+        Some(claim_of_led(&along.collect::<Vec<f64>>(), size, noise))
     }
 }

@@ -47,21 +47,6 @@ pub(super) struct Tracked {
     pub surprises: [Vec<f64>; 2],
 }
 
-impl Tracked {
-    /// A tone of a size whose phase is known of another one, with its surprises in noise of that variance in either part.
-    pub fn led(size: f64, noise: f64, surprises: [Vec<f64>; 2]) -> Self {
-        Self {
-            at: [size.ln(), 0.0, 0.0, 0.0],
-            covariance: vec![],
-            nats: 0.0,
-            noise,
-            turned: 0.0,
-            phase: vec![],
-            surprises,
-        }
-    }
-}
-
 /// The law at some coordinates, over so many blocks.
 fn law_at(x: &[f64], blocks: usize) -> Law {
     let time = x[2].exp().clamp(SHORTEST, blocks as f64);
