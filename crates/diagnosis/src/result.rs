@@ -123,6 +123,9 @@ pub struct Finding {
     /// the finding are those of the largest, and their `count`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub occurrences: Vec<BTreeMap<String, BTreeMap<String, Parameter>>>,
+    /// Parameters of the other tones of a rotor, by channel; those of the finding are the strongest one's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub harmonics: Vec<BTreeMap<String, BTreeMap<String, Parameter>>>,
     /// Times of the events, s from the start, for causes that happen at instants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub times_s: Vec<f64>,

@@ -129,25 +129,84 @@ impl Belief {
     }
 }
 
+/// What is read of a tone, or of a multiple of it whose phase is that of the tone times a `ratio`, negative where sampling turns it
+/// back: blocks (re, im), each in noise of a variance in either part.
+pub struct Reading<'a> {
+    /// The ratio.
+    pub ratio: f64,
+    /// The variance.
+    pub variance: f64,
+    /// The blocks.
+    pub blocks: &'a [[f64; 2]],
+}
+
+impl<'a> Reading<'a> {
+    /// Of the tone itself.
+    #[must_use]
+    pub fn of_tone(blocks: &'a [[f64; 2]], variance: f64) -> Self {
+        Self {
+            ratio: 1.0,
+            variance,
+            blocks,
+        }
+    }
+
+    /// What a block tells of a tone of an amplitude: what is believed then, by how many nats it is ahead of noise, and how far it is from
+    /// what was believed.
+    fn told(&self, block: usize, believed: Belief, amplitude: f64) -> (Belief, f64, [f64; 2]) {
+        let [re, im] = self.blocks[block];
+        let (a, k, variance) = (amplitude, self.ratio, self.variance);
+        let (sin, cos) = (k * believed.phase).sin_cos();
+        let turned = [cos * re + sin * im, cos * im - sin * re];
+        let [p, q, r] = believed.covariance;
+        let moves = a * k;
+        let across = moves * moves * p + variance;
+        // A phase in doubt shortens what lies along it, by a variance of half the square of its own.
+        let doubt = k * k * p;
+        let along = variance + 0.5 * (a * doubt).powi(2);
+        let short = turned[0] - a * (-0.5 * doubt).exp();
+        let mut nats = 0.5 * ((re * re + im * im) / variance);
+        nats -= 0.5 * (turned[1].powi(2) / across + (across / variance).ln());
+        nats -= 0.5 * (short * short / along + (along / variance).ln());
+        let gain = [moves * p / across, moves * q / across];
+        let told = Belief {
+            phase: believed.phase + gain[0] * turned[1],
+            pitch: believed.pitch + gain[1] * turned[1],
+            covariance: [
+                p - gain[0] * moves * p,
+                q - gain[0] * moves * q,
+                r - gain[1] * moves * q,
+            ],
+        };
+        (
+            told,
+            nats,
+            [turned[1] / across.sqrt(), short / along.sqrt()],
+        )
+    }
+}
+
 /// What one block told.
 #[derive(Clone, Copy)]
 pub struct Step {
     foreseen: Belief,
     told: Belief,
-    /// Across and along the foreseen phase, over their standard deviations.
+    /// Across and along the foreseen phase, over their standard deviations, of the first reading.
     pub surprise: [f64; 2],
 }
 
-/// Nats by which a law is ahead of noise of that variance in either part of a block, (re, im); what each block tells goes to `seen`.
-pub fn follow(blocks: &[[f64; 2]], variance: f64, law: &Law, mut seen: impl FnMut(&Step)) -> f64 {
+/// Nats by which a law is ahead of noise in some readings, the first of which is of the tone itself; what each block of them tells, by
+/// all of them, goes to `seen`.
+pub fn follow(readings: &[Reading<'_>], law: &Law, mut seen: impl FnMut(&Step)) -> f64 {
     let a = law.amplitude;
-    let Some([re, im]) = blocks.first() else {
+    let Some((first, [re, im])) = readings.first().and_then(|r| Some((r, r.blocks.first()?)))
+    else {
         return 0.0;
     };
     let mut now = Belief {
         phase: im.atan2(*re),
         pitch: 0.0,
-        covariance: [variance / (a * a), 0.0, law.spread * law.spread],
+        covariance: [first.variance / (a * a), 0.0, law.spread * law.spread],
     };
     seen(&Step {
         foreseen: now,
@@ -155,32 +214,22 @@ pub fn follow(blocks: &[[f64; 2]], variance: f64, law: &Law, mut seen: impl FnMu
         surprise: [0.0; 2],
     });
     let mut nats = 0.0;
-    for [re, im] in &blocks[1..] {
+    for block in 1..first.blocks.len() {
         let foreseen = now.next(law);
-        let (sin, cos) = foreseen.phase.sin_cos();
-        let turned = [cos * re + sin * im, cos * im - sin * re];
-        let [p, q, r] = foreseen.covariance;
-        let across = a * a * p + variance;
-        // A phase in doubt shortens what lies along it, by a variance of half the square of its own.
-        let along = variance + 0.5 * (a * p).powi(2);
-        let short = turned[0] - a * (-0.5 * p).exp();
-        nats += 0.5 * ((re * re + im * im) / variance);
-        nats -= 0.5 * (turned[1].powi(2) / across + (across / variance).ln());
-        nats -= 0.5 * (short * short / along + (along / variance).ln());
-        let gain = [a * p / across, a * q / across];
-        now = Belief {
-            phase: foreseen.phase + gain[0] * turned[1],
-            pitch: foreseen.pitch + gain[1] * turned[1],
-            covariance: [
-                p - gain[0] * a * p,
-                q - gain[0] * a * q,
-                r - gain[1] * a * q,
-            ],
-        };
+        let mut surprise = [0.0; 2];
+        now = foreseen;
+        for (i, reading) in readings.iter().enumerate() {
+            let (told, ahead, off) = reading.told(block, now, a);
+            if i == 0 {
+                surprise = off;
+            }
+            nats += ahead;
+            now = told;
+        }
         seen(&Step {
             foreseen,
             told: now,
-            surprise: [turned[1] / across.sqrt(), short / along.sqrt()],
+            surprise,
         });
     }
     if nats.is_finite() { nats } else { f64::MIN }

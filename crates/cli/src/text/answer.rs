@@ -1,6 +1,6 @@
 //! A finding in sentences for a person: what it is and how large, what it costs to leave it out, what is still open.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use diagnosis::result::{Finding, Parameter, Unexplained};
 use model::effect::Parameters;
@@ -59,10 +59,25 @@ pub fn headline(finding: &Finding) -> String {
     match sizes.is_empty() {
         true => format!("{place}: {title} ({})", finding.cause),
         false => format!(
-            "{place}: {title} ({}), {times}{}{effective}",
+            "{place}: {title} ({}), {times}{}{}{effective}",
             finding.cause,
-            sizes.join("; ")
+            sizes.join("; "),
+            other_tones(finding)
         ),
+    }
+}
+
+/// The pitches of the other tones of a rotor.
+fn other_tones(finding: &Finding) -> String {
+    let pitch = |by: &BTreeMap<String, Parameters>| {
+        let first = by.values().next()?.get("center_frequency")?;
+        Some(without_error(first.value))
+    };
+    let pitches: Vec<String> = finding.harmonics.iter().filter_map(pitch).collect();
+    match &pitches[..] {
+        [] => String::new(),
+        [one] => format!("; and a tone at {one} Hz that turns with it"),
+        some => format!("; and tones at {} Hz that turn with it", some.join(", ")),
     }
 }
 

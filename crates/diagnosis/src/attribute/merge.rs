@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use model::effect::Parameters;
-use model::effects::effect;
+use model::effects::{effect, wandering_line};
 
 use crate::attribute::events::{BLOW_S, blow_of, step_at};
 use crate::ingest::types::Grid;
@@ -160,6 +160,57 @@ pub(crate) fn repeated(findings: Vec<Finding>) -> Vec<Finding> {
         }
     }
     all.into_iter().map(of_occurrences).collect()
+}
+
+/// One finding for the tones of a rotor: their pitches stay for one time.
+pub(crate) fn rotors(findings: Vec<Finding>) -> Vec<Finding> {
+    let stays = |f: &Finding| {
+        f.parameters
+            .get(wandering_line::PITCH_TIME)
+            .map(|p| p.value)
+    };
+    let size = |f: &Finding| f.parameters.get("amplitude").map_or(0.0, |p| p.value);
+    let mut all: Vec<Finding> = vec![];
+    for mut f in findings {
+        let same = |o: &&mut Finding| o.cause == f.cause && stays(o) == stays(&f);
+        match stays(&f).and_then(|_| all.iter_mut().find(same)) {
+            Some(other) => {
+                if size(&f) > size(other) {
+                    std::mem::swap(other, &mut f);
+                }
+                add_tone(other, f);
+            }
+            None => all.push(f),
+        }
+    }
+    all
+}
+
+/// Adds another tone of a rotor to the strongest one.
+fn add_tone(finding: &mut Finding, mut tone: Finding) {
+    let channels = std::mem::take(&mut tone.channels);
+    if finding.per_channel.is_empty() {
+        let own = finding.channels.iter();
+        finding.per_channel = own
+            .map(|c| (c.clone(), finding.parameters.clone()))
+            .collect();
+    }
+    for channel in &channels {
+        if !finding.channels.contains(channel) {
+            finding.channels.push(channel.clone());
+        }
+    }
+    finding.effective |= tone.effective;
+    let ratio = |f: &Finding| f.likelihood_ratio.unwrap_or(0.0);
+    finding.likelihood_ratio = Some(ratio(finding) + ratio(&tone));
+    add_gain(finding, tone.gain.take());
+    finding.what = format!("{}; {}", finding.what, tone.what);
+    finding.harmonics.append(&mut tone.harmonics);
+    if tone.per_channel.is_empty() {
+        let each = channels.into_iter().map(|c| (c, tone.parameters.clone()));
+        tone.per_channel = each.collect();
+    }
+    finding.harmonics.push(tone.per_channel);
 }
 
 /// Parameters of one finding by channel.

@@ -123,6 +123,13 @@ impl Term {
         }
     }
 
+    /// Whether it and another one are tones of one rotor: their pitches stay for one time.
+    pub(crate) fn turns_with(&self, other: &Self) -> bool {
+        let stays = |t: &Self| Some(t.stated.as_ref()?.last()?.0);
+        let tracked = self.path.is_some() && other.path.is_some();
+        tracked && stays(self) == stays(other)
+    }
+
     /// Likelihood ratio beyond the threshold.
     #[must_use]
     pub fn score(&self) -> f64 {

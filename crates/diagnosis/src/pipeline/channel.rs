@@ -14,7 +14,7 @@ use crate::joint;
 use crate::report::detection_limits;
 use crate::result::Check;
 use crate::search::searched::Searched;
-use crate::search::tracked::Lead;
+use crate::search::tracked::{Rotor, rotors};
 use crate::search::{Search, bands, impute};
 use crate::test_level::{self, CheckId, Outcome, all_worded, omnibus_level, worded};
 use crate::two_level::compare;
@@ -71,28 +71,25 @@ pub(super) fn all_searched(grid: &Grid, between: bool) -> Vec<Searched<'_>> {
     let laid = first.chain(std::iter::repeat_with(|| None));
     let alone = test_level::on_two_threads(grid.targets.iter().zip(laid), |(target, laid)| {
         let laid = laid.unwrap_or_else(|| laid_out(grid, target));
-        searched_from(grid, target, laid, between, &[])
+        searched_from(grid, target, laid, between, (0, &[]))
     });
-    led_by_others(grid, alone, between)
+    beside_rotors(grid, alone, between)
 }
 
-/// Searches those channels again that have a line or a band where a multiple of a tone of another channel is, the phase of which was
-/// tracked better there: what shakes a stand is felt by all, and told best by the one that it shakes most.
-fn led_by_others<'a>(grid: &'a Grid, alone: Vec<Searched<'a>>, between: bool) -> Vec<Searched<'a>> {
-    let leads: Vec<(usize, Lead)> = (alone.iter().enumerate())
-        .flat_map(|(k, s)| s.state.terms.iter().map(move |t| (k, t)))
-        .filter_map(|(k, t)| Some((k, Lead::of(t)?)))
-        .collect();
-    let spacing = std::f64::consts::PI / grid.n as f64;
-    let of_channel = |k: usize, s: &Searched<'_>| -> Vec<Lead> {
-        let others = leads.iter().filter(|(of, _)| *of != k).map(|(_, l)| l);
-        let helps = |l: &&Lead| s.state.terms.iter().any(|t| l.may_lead(t, spacing));
-        others.filter(helps).cloned().collect()
-    };
-    let with = (alone.into_iter().enumerate()).map(|(k, s)| (of_channel(k, &s), s));
-    test_level::on_two_threads(with, |(leads, s)| match leads.is_empty() {
-        true => s,
-        false => searched_from(grid, s.target, laid_out(grid, s.target), between, &leads),
+/// Searches those channels again that have a part of a rotor: what shakes a stand is felt by all, and told best by all together.
+fn beside_rotors<'a>(grid: &'a Grid, alone: Vec<Searched<'a>>, between: bool) -> Vec<Searched<'a>> {
+    let rotors = rotors(grid, &alone);
+    test_level::on_two_threads(alone.into_iter().enumerate(), |(k, s)| {
+        match rotors.iter().any(|r| r.is_on(k)) {
+            true => searched_from(
+                grid,
+                s.target,
+                laid_out(grid, s.target),
+                between,
+                (k, &rotors),
+            ),
+            false => s,
+        }
     })
 }
 
@@ -115,7 +112,7 @@ pub(super) fn best(grid: &Grid, target: &Target, log_walk: f64) -> (f64, f64) {
 
 /// Searches a channel, and asks its model and what that leaves.
 pub(super) fn searched<'a>(grid: &'a Grid, target: &'a Target) -> Searched<'a> {
-    searched_from(grid, target, laid_out(grid, target), false, &[])
+    searched_from(grid, target, laid_out(grid, target), false, (0, &[]))
 }
 
 fn searched_from<'a>(
@@ -123,7 +120,7 @@ fn searched_from<'a>(
     target: &'a Target,
     search: Search<'a>,
     between: bool,
-    leads: &[Lead],
+    (number, rotors): (usize, &[Rotor]),
 ) -> Searched<'a> {
     let baseline = search.baseline(&target.noise);
     let mut plain = whitened(&search.panel, &baseline);
@@ -137,7 +134,7 @@ fn searched_from<'a>(
         };
         compare::hold(&search, search.beside_a_stretch(ascended, &baseline))
     };
-    let explained = search.beside_tracked_tones(explained(), leads, &explained);
+    let explained = search.beside_tracked_tones(explained(), number, rotors, &explained);
     let mut state = search.conclude(explained);
     let refilled = impute::again(&search, &state, target);
     if let Some(refilled) = refilled.clone() {

@@ -78,8 +78,8 @@ pub(super) fn concluded(
     handover::size_outliers(&mut findings, searched);
     Told {
         checks,
-        findings: merge::complete(merge::repeated(merge::joined(merge::loud(merge::blows(
-            findings,
+        findings: merge::complete(merge::repeated(merge::rotors(merge::joined(merge::loud(
+            merge::blows(findings),
         ))))),
         nearest: merge::complete(nearest),
         unexplained,

@@ -327,7 +327,8 @@ pub(crate) fn effects_of(findings: &[&Finding]) -> Vec<EffectModel> {
             }));
         }
         let whole = f.occurrences.is_empty().then_some(&f.per_channel);
-        for once in whole.into_iter().chain(&f.occurrences) {
+        let several = f.occurrences.iter().chain(&f.harmonics);
+        for once in whole.into_iter().chain(several) {
             // What is the same to the last digit on several channels is one event on all of them.
             let first = all.len();
             for (channel, p) in once {

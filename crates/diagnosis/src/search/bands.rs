@@ -273,6 +273,7 @@ impl Search<'_> {
         let moves: Vec<Option<Moves>> = (bands.iter())
             .map(|b| b.as_ref().and_then(|(band, from)| Moves::of(band, *from)))
             .collect();
+        let firsts: Vec<usize> = clusters.iter().map(|c| c[0]).collect();
         for (number, (cluster, band)) in clusters.into_iter().zip(&bands).enumerate() {
             // Of a tone that was tracked its course has told.
             let tracked = cluster.iter().any(|i| state.terms[*i].stated.is_some());
@@ -286,7 +287,11 @@ impl Search<'_> {
             );
             let lr = 2.0 * (state.solution.log_likelihood - rest.solution.log_likelihood);
             let lr = self.of_read() * lr;
-            let others = moves.iter().enumerate().filter(|(k, _)| *k != number);
+            // What else turns with a rotor is named with it.
+            let own = &state.terms[cluster[0]];
+            let turns_with = |k: &usize| own.turns_with(&state.terms[firsts[*k]]);
+            let others = moves.iter().enumerate();
+            let others = others.filter(|(k, _)| *k != number && !turns_with(k));
             let others: Vec<&Moves> = others.filter_map(|(_, m)| m.as_ref()).collect();
             // A tone that accelerometers read is a motion of the stand, harmonics and all; and what is locked to another is none that
             // noise drives.
@@ -294,7 +299,7 @@ impl Search<'_> {
                 .is_some_and(|own| band_source::is_read(own, self.view.signals, &felt));
             let is_harmonic = is_read
                 && (moves[number].as_ref()).is_some_and(|own| band_alone::is_locked(own, &others));
-            let harmonics = moves[number].as_ref();
+            let harmonics = moves[number].as_ref().filter(|_| !tracked);
             let harmonics = harmonics.map_or(vec![], |own| self.harmonics(state, &cluster, own));
             for (place, i) in cluster.iter().enumerate() {
                 let t = &mut state.terms[*i];

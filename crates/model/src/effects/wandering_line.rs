@@ -19,6 +19,9 @@ pub struct WanderingLine;
 /// Its id.
 pub const ID: &str = "wandering_line";
 
+/// Name of the correlation time of the pitch: to the last digit the same of all tones of one rotor.
+pub const PITCH_TIME: &str = "pitch_time";
+
 /// The one instance that the library lists.
 pub static EFFECT: WanderingLine = WanderingLine;
 
@@ -46,7 +49,7 @@ impl Effect for WanderingLine {
                 "standard deviation of its frequency; left out, the phase is a random walk",
             ),
             optional(
-                "pitch_time",
+                PITCH_TIME,
                 "s",
                 "correlation time of its frequency; left out, the phase is a random walk",
             ),
@@ -75,7 +78,7 @@ impl Effect for WanderingLine {
 
     fn named_first(&self, parameters: &Parameters) -> &'static [&'static str] {
         match parameters.contains_key("pitch_rms") {
-            true => &["amplitude", "center_frequency", "pitch_rms", "pitch_time"],
+            true => &["amplitude", "center_frequency", "pitch_rms", PITCH_TIME],
             false => &[],
         }
     }
@@ -141,7 +144,7 @@ impl Effect for WanderingLine {
         let width = value(parameters, "linewidth");
         let step = (TAU * width / simulation.rate_hz).max(0.0).sqrt();
         let turn = TAU * centre / simulation.rate_hz;
-        let time = value(parameters, "pitch_time") * simulation.rate_hz;
+        let time = value(parameters, PITCH_TIME) * simulation.rate_hz;
         let rms = TAU * value(parameters, "pitch_rms") / simulation.rate_hz;
         let stays = (rms > 0.0 && time > 0.0).then(|| (rms, (-1.0 / time).exp()));
         let keeps = simulation.keeps(parameters);
@@ -190,7 +193,7 @@ fn tracked(found: &Found, all: [(f64, f64); 5]) -> Parameters {
         ("center_frequency", told(mean, hz, "Hz")),
         ("linewidth", told(half, 2.0 * hz, "Hz")),
         ("pitch_rms", told(rms, hz, "Hz")),
-        ("pitch_time", told(time, found.rate_hz.recip(), "s")),
+        (PITCH_TIME, told(time, found.rate_hz.recip(), "s")),
     ]
     .map(|(name, p)| (name.to_owned(), p))
     .into()

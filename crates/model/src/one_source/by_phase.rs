@@ -4,7 +4,7 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use crate::tone::{Law, Step, drawn, follow, smoothed};
+use crate::tone::{Law, Reading, Step, drawn, follow, smoothed};
 
 /// Phase that a usual departure of the pitch turns over a block, rad: of the size it takes its square over 24.
 const TURN: f64 = 0.3;
@@ -162,7 +162,8 @@ impl ByPhase {
         };
         let blocks: Vec<[f64; 2]> = (0..blocks).map(one).collect();
         let mut steps = Vec::with_capacity(blocks.len());
-        follow(&blocks, weight.recip(), law, |s| steps.push(*s));
+        let reading = Reading::of_tone(&blocks, weight.recip());
+        follow(&[reading], law, |s| steps.push(*s));
         let phases = smoothed(&steps, law);
         (steps, phases)
     }

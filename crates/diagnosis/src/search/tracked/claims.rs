@@ -34,14 +34,12 @@ pub(super) fn claim(seen: &Tracked, memory: &Tracked) -> Outcome {
     farthest(&chances, along, own)
 }
 
-/// The same of one that another tone leads, by its surprises along the phase: that its size is steady. Of the pitch that one tells.
-pub(super) fn claim_of_led(along: &[f64], amplitude: f64, noise: f64) -> Outcome {
+/// The same of one of so many tones that a rotor makes, by its surprises along the phase: that its size is steady. The pitch is the
+/// rotor's.
+pub(super) fn claim_of_part(along: &[f64], amplitude: f64, noise: f64, among: usize) -> Outcome {
     let (along, own) = (within_ends(along), over_noise(amplitude, noise));
-    farthest(
-        &[("its size is not steady", unsteady(&along, own))],
-        &along,
-        own,
-    )
+    let chance = (among as f64 * unsteady(&along, own)).min(1.0);
+    farthest(&[("its size is not steady", chance)], &along, own)
 }
 
 /// Power of a tone over the variance of the noise in either part of a block.

@@ -2,7 +2,7 @@
 
 use rustfft::num_complex::Complex;
 
-use model::tone::{Law, Step, follow, smoothed};
+use model::tone::{Law, Reading, Step, follow, smoothed};
 
 use crate::fit::likelihood::invert;
 use numerics::minimise::nelder_mead;
@@ -53,33 +53,38 @@ fn law_at(x: &[f64], blocks: usize) -> Law {
     Law::new(x[0].exp(), x[1].exp(), time, x[3])
 }
 
-/// The likeliest law beside noise of that variance in either part of a block, and what it says of every block.
+/// The likeliest law of blocks beside noise of that variance in either part, and what it says of every block.
 pub(super) fn tracked(blocks: &[Complex<f64>], variance: f64) -> Tracked {
     let count = blocks.len() as f64;
     let energy = blocks.iter().map(Complex::norm_sqr).sum::<f64>() / count;
     let amplitude = (energy - 2.0 * variance).max(variance).sqrt();
     let turn: Complex<f64> = blocks.windows(2).map(|w| w[1] * w[0].conj()).sum();
     let parts: Vec<[f64; 2]> = blocks.iter().map(|z| [z.re, z.im]).collect();
-    let below = |x: &[f64]| -follow(&parts, variance, &law_at(x, parts.len()), |_| {});
-    let from = |(spread, time): (f64, f64)| {
-        let start = [amplitude.ln(), spread.ln(), time.ln(), turn.arg()];
-        nelder_mead(&below, &start, &STEPS, LOOK)
-    };
-    let looks = STARTS.map(from).into_iter();
+    let starts = STARTS.map(|(spread, time)| [amplitude.ln(), spread.ln(), time.ln(), turn.arg()]);
+    likeliest(&[Reading::of_tone(&parts, variance)], &starts)
+}
+
+/// The likeliest law of some readings of one phase, from some coordinates on.
+pub(super) fn likeliest(readings: &[Reading<'_>], starts: &[Coordinates]) -> Tracked {
+    let count = readings.first().map_or(0, |r| r.blocks.len());
+    let below = |x: &[f64]| -follow(readings, &law_at(x, count), |_| {});
+    let looks = starts
+        .iter()
+        .map(|start| nelder_mead(&below, start, &STEPS, LOOK));
     let best = looks.min_by(|a, b| below(a).total_cmp(&below(b)));
     let best = nelder_mead(&below, &best.unwrap_or_default(), &STEPS, LAST);
     let mut at = [0.0; 4];
     at.iter_mut().zip(&best).for_each(|(a, b)| *a = *b);
-    at[2] = at[2].clamp(SHORTEST.ln(), count.ln());
-    let law = law_at(&at, parts.len());
+    at[2] = at[2].clamp(SHORTEST.ln(), (count as f64).ln());
+    let law = law_at(&at, count);
     at[1] = law.spread().ln();
-    let mut steps: Vec<Step> = Vec::with_capacity(parts.len());
-    let nats = follow(&parts, variance, &law, |s| steps.push(*s));
+    let mut steps: Vec<Step> = Vec::with_capacity(count);
+    let nats = follow(readings, &law, |s| steps.push(*s));
     Tracked {
         at,
         covariance: covariance(&below, &at),
         nats,
-        noise: variance,
+        noise: readings.first().map_or(0.0, |r| r.variance),
         turned: law.unforeseen(),
         phase: smoothed(&steps, &law),
         surprises: [0, 1].map(|k| steps[1..].iter().map(|s| s.surprise[k]).collect()),

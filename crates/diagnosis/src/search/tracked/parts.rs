@@ -1,0 +1,119 @@
+//! The tones of a channel that are parts of a rotor: by its phase each is two coefficients of a linear fit, however weak it is and
+//! wherever it folds to.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use numerics::column::dot;
+use rustfft::num_complex::Complex;
+
+use super::claims::claim_of_part;
+use super::rotor::{LEAST_PART, Rotor};
+use super::{LEAST_BLOCKS, MOST_DOUBLED, Place, REACH, TrackedTone};
+use super::{places, turned_back, without_others};
+use crate::fit::channel::{Path, State};
+use crate::search::Search;
+use crate::test_level::Outcome;
+use model::effect::Peak;
+
+impl Search<'_> {
+    /// The tones of a channel that are parts of a rotor.
+    pub(super) fn parts(&self, state: &State, rotor: &Rotor, target: usize) -> Vec<TrackedTone> {
+        let all = places(state, self.spacing());
+        let one = |ratio: f64| self.part(state, &all, rotor, ratio);
+        rotor.ratios_on(target).filter_map(one).collect()
+    }
+
+    /// The tone of so many times the pitch of a rotor.
+    fn part(&self, state: &State, all: &[Place], of: &Rotor, ratio: f64) -> Option<TrackedTone> {
+        let n = self.panel.bins.n;
+        let (middle, half) = of.lead.place(ratio, self.spacing());
+        let about = Place {
+            terms: vec![],
+            from: middle - half,
+            to: middle + half,
+        };
+        let place = about.wider(1.0, all);
+        let to_k = n as f64 / PI;
+        let from = (place.from * to_k).max(1.0) as usize;
+        let to = ((place.to * to_k) as usize).min(n);
+        let others = without_others(self, state, &place.terms);
+        let density = self.density_about(state, &place.wider(f64::from(1 << MOST_DOUBLED), all));
+        let mut led = of.lead.times(ratio);
+        let path = Arc::make_mut(&mut led.path);
+        let columns = path.quadratures(n).map(|c| self.panel.dct.forward(&c));
+        let [own, across] = [0, 1].map(|k| &columns[k][from..to]);
+        let (p, q, r) = (dot(own, own), dot(own, across), dot(across, across));
+        let read = &others[from..to];
+        let (x, y) = (dot(own, read), dot(across, read));
+        let whole = p * r - q * q;
+        let (a, b) = ((r * x - q * y) / whole, (p * y - q * x) / whole);
+        let nats = 0.5 * (a * x + b * y) / density;
+        if nats.is_nan() || nats < LEAST_PART {
+            return None;
+        }
+        path.amplitude = a.hypot(b);
+        let ahead = -b.atan2(a);
+        path.phase.iter_mut().for_each(|(phase, _)| *phase += ahead);
+        led.stated[0] = (path.amplitude, (density / (0.5 * (p + r))).sqrt());
+        let course = path.course(n);
+        let mut term = self.described(led.stated, &led.path, density, nats)?;
+        // Where it is, the rotor tells: it is not the best of all places.
+        term.threshold = term.threshold.min(2.0 * LEAST_PART);
+        term.claims.push(of.claim.clone());
+        Some(TrackedTone {
+            term,
+            course,
+            by_itself: 0.25 * n as f64 * led.path.doubt() * led.path.amplitude.powi(2) / density,
+            among: of.tones(),
+            from: place.from,
+            to: place.to,
+        })
+    }
+
+    /// Puts to a tone what is claimed of its size, beside the noise that is found without it: that it is steady. Not where half the
+    /// sample rate turns it back.
+    pub(super) fn claim_steady(&self, tone: &mut TrackedTone, rest: &State) {
+        let claim = tone.term.path.as_deref().zip(tone.term.peak());
+        let claim = claim.and_then(|(path, peak)| self.steady(tone, path, &peak, rest));
+        tone.term.claims.extend(claim);
+    }
+
+    fn steady(
+        &self,
+        tone: &TrackedTone,
+        path: &Path,
+        peak: &Peak,
+        rest: &State,
+    ) -> Option<Outcome> {
+        let n = self.panel.bins.n;
+        let spacing = self.spacing();
+        let reach = (REACH * peak.half_width / spacing).max(LEAST_BLOCKS as f64) as usize;
+        let middle = (peak.omega / spacing) as usize;
+        let from = middle.checked_sub(reach).filter(|f| *f > 0)?;
+        if from + 2 * reach > n {
+            return None;
+        }
+        let tone_again = self.panel.dct.forward(&tone.course);
+        let without = without_others(self, rest, &[]);
+        let here = from..from + 2 * reach;
+        let pairs = without[here.clone()].iter().zip(&tone_again[here.clone()]);
+        let coefficients: Vec<f64> = pairs.map(|(w, t)| w + t).collect();
+        let noise = rest.noise.through(here.map(|k| k as f64 * spacing));
+        let density = rest.solution.white * noise.iter().sum::<f64>() / noise.len() as f64;
+        let turn = (from + reach) as f64 * spacing;
+        let blocks = turned_back(&coefficients, turn, n);
+        let length = n as f64 / reach as f64;
+        let noise = 2.0 * density / length;
+        let size = path.amplitude;
+        let along = blocks.iter().enumerate().map(|(k, z)| {
+            let at = (k as f64 + 1.0) * length - 0.5;
+            let (phase, doubt) = path.at(at);
+            let z = z * Complex::from_polar(1.0, turn * at - phase);
+            let spread = noise + 0.5 * (size * doubt).powi(2);
+            (z.re - size * (-0.5 * doubt).exp()) / spread.sqrt()
+        });
+        let along: Vec<f64> = along.collect();
+        Some(claim_of_part(&along, size, noise, tone.among))
+    }
+}
