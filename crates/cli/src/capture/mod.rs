@@ -45,6 +45,7 @@ mod tables;
 mod time;
 mod units;
 mod unpack;
+mod utf16;
 mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};

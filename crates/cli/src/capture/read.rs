@@ -29,6 +29,7 @@ use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
 use super::tables::read_table;
+use super::utf16::utf8;
 use super::{CaptureError, ColumnMapping};
 
 /// How to read.
@@ -102,7 +103,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         return from_table(table?, options, Of::File);
     }
     no_topics(options)?;
-    let mut text = TextLines::new(input)?;
+    let mut text = TextLines::new(utf8(input).map_err(io)?)?;
     let mut layout = Layout::read(&mut text)?;
     if layout.first.is_none() {
         // Before anything is asked of its columns.
