@@ -2,9 +2,11 @@
 
 use crate::text::shell_word;
 
+use super::super::angle::Angle;
 use super::super::columns::Said;
 use super::super::error::{brief, brief_list};
 use super::super::mapped::place;
+use super::super::units::is_angle;
 use super::super::{CaptureError, ColumnMapping};
 use super::seen::Seen;
 use super::{Guess, alias, guess};
@@ -23,6 +25,8 @@ pub(super) struct Proposal {
     pub open: Vec<&'static str>,
     /// A name that two columns have, one of them in it.
     pub twice: Option<String>,
+    /// What else has to be known of the columns.
+    pub hints: Vec<String>,
 }
 
 /// A mapping made of a file's column names. `numbered` says that the names are made up, and columns are called by their
@@ -84,6 +88,8 @@ fn asked(guess: Guess, said: &Said<'_>, mapping: &ColumnMapping, knows_rate: boo
         columns,
         units,
         is_ambiguous: guess.is_ambiguous,
+        is_bare: guess.is_bare,
+        second: Vec::new(),
     }
 }
 
@@ -118,7 +124,12 @@ fn line_of(
             format!("{ours}={name}")
         }
     };
-    let mut open = Vec::new();
+    let name_of = |key: &str| {
+        let of = (guess.columns.iter()).find(|(ours, _)| ours.starts_with(key));
+        let name = of.and_then(|(_, at)| names.get(*at));
+        name.map_or("", String::as_str)
+    };
+    let (mut open, mut hints) = (Vec::new(), Vec::new());
     let mut units: Vec<String> = (given.iter())
         .map(|(key, unit)| format!("{key}={unit}"))
         .collect();
@@ -126,9 +137,24 @@ fn line_of(
         match (*key, *said) {
             // Seconds go without saying; other times are guessed by nobody.
             ("time", None | Some("s")) => {}
+            ("gyro", Some(unit)) if is_angle(unit) => {
+                open.push("angle");
+                units.push(format!("gyro={UNIT}"));
+                hints.push(format!(
+                    "put in the unit, as {unit} is an angle's ({})",
+                    Angle::of(name_of("gyro")).help(unit)
+                ));
+            }
             (key, Some(unit)) => units.push(format!("{key}={unit}")),
             ("freq", None) => units.push("freq=1".to_owned()),
             (key, None) => {
+                let is_angle = || Angle::of(name_of("gyro")) == Angle::Attitude;
+                if key == "gyro" && is_angle() {
+                    hints.push(format!(
+                        "so called are angles, most often: {}",
+                        Angle::Attitude.help("deg")
+                    ));
+                }
                 open.push(key);
                 units.push(format!("{key}={UNIT}"));
             }
@@ -143,7 +169,42 @@ fn line_of(
     if !has_time && !knows_rate {
         line += " --rate HZ";
     }
-    Proposal { line, open, twice }
+    hints.extend(hints_of(guess, numbered, &column));
+    Proposal {
+        line,
+        open,
+        twice,
+        hints,
+    }
+}
+
+/// What else has to be known of the columns.
+fn hints_of(
+    guess: &Guess,
+    numbered: bool,
+    column: &dyn Fn(&(String, usize)) -> String,
+) -> Vec<String> {
+    let mut hints = Vec::new();
+    if guess.columns.iter().any(|(_, at)| *at == usize::MAX) && numbered {
+        hints.push(format!(
+            "put in each {COLUMN}: their order says no sensor, and none reads gravity in a unit"
+        ));
+    }
+    if guess.is_bare {
+        hints.push("x, y, z may be of any sensor: of an accelerometer write acc_x, acc_y, acc_z; a phone's gyro is in rad/s".to_owned());
+    }
+    if guess
+        .second
+        .iter()
+        .any(|(ours, _)| ours.starts_with("gyro"))
+    {
+        let second: Vec<String> = guess.second.iter().map(column).collect();
+        hints.push(format!(
+            "the file has a second gyro: read it in a run of its own, with {} in place of the first",
+            shell_word(&second.join(","))
+        ));
+    }
+    hints
 }
 
 /// An error of columns that mean nothing here; a mapping is [`proposed`] once rows are seen.
@@ -176,7 +237,12 @@ pub(in crate::capture) fn proposed(
             help: "leave it out: the file is a capture, and all of its columns are read".to_owned(),
         };
     }
-    let Proposal { line, open, twice } = if lacks_one {
+    let Proposal {
+        line,
+        open,
+        twice,
+        hints,
+    } = if lacks_one {
         let guess = guess(said.names, said.numbered, seen);
         let guess = asked(guess, said, mapping, knows_rate);
         line_of(
@@ -199,6 +265,7 @@ pub(in crate::capture) fn proposed(
             brief(&name)
         );
     }
+    hints.iter().for_each(|of| hint += &format!("; {of}"));
     let asked: Vec<&str> = open.iter().filter_map(|key| choices(key)).collect();
     if !asked.is_empty() {
         hint += &format!(
@@ -221,6 +288,9 @@ fn choices(key: &str) -> Option<&'static str> {
             Some("gyro: deg/s, rad/s as phones and ROS have it, or what a count is: `0.0076deg/s`")
         }
         "acc" => Some("acc: m/s2, g, mg, or what a count is"),
+        "temp" => Some(
+            "temp: degC, or what a count is, `0.1degC`; leave temp out where 0 counts are not 0 degC",
+        ),
         _ => None,
     }
 }

@@ -55,8 +55,31 @@ impl Seen {
         self.of(at).is_some_and(|v| largest(v) < NO_RATE)
     }
 
-    /// The unit in which three columns read gravity; `None` where they do not.
+    /// Whether all of its numbers are whole.
+    pub fn is_whole(&self, at: usize) -> bool {
+        let whole = |v: &[f64]| v.iter().all(|x| x.fract() == 0.0 || x.is_nan());
+        self.of(at).is_some_and(whole)
+    }
+
+    /// Whether it holds text: it has rows, and no number.
+    pub fn is_text(&self, at: usize) -> bool {
+        self.of(at).is_some_and(|v| v.iter().all(|x| x.is_nan()))
+    }
+
+    /// Whether there are rows to go by.
+    pub fn has_rows(&self) -> bool {
+        self.of(0).is_some()
+    }
+
+    /// The unit in which three columns read gravity; `None` where they do not, and where a part of 1024 counts a g does, too.
     pub fn gravity(&self, of: &[usize]) -> Option<&'static str> {
+        let is_counted = of.iter().all(|at| self.is_whole(*at));
+        self.reads_gravity(of)
+            .filter(|unit| *unit != "mg" || !is_counted)
+    }
+
+    /// The unit in which three columns most probably read gravity; `None` where they do not.
+    pub fn reads_gravity(&self, of: &[usize]) -> Option<&'static str> {
         let means: Option<Vec<f64>> = of
             .iter()
             .map(|at| {
