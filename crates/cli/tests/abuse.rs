@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use common::{assert_refused, assert_success, folder, run};
+use common::{assert_refused, assert_success, folder, run, said};
 
 /// Longer, and a person has given up; a debug build on a shared machine needs a part of it.
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -213,4 +213,20 @@ fn a_full_disk_under_standard_output_is_told() {
         .output()
         .expect("the program starts");
     assert_refused(&output, &["cannot write standard output", "make room"]);
+}
+
+#[test]
+fn a_stop_that_nobody_could_press_is_refused_with_the_line_that_has_it() {
+    let folder = folder("a_stop_that_nobody_could_press_is_refused_with_the_line_that_has_it");
+    let out = folder.join("run.csv");
+    let out = out.to_str().expect("UTF-8");
+    let refused = run(&["run", "--native", "--stop", "20,25", "--out", out]);
+    let told = said(&refused);
+    assert!(!refused.status.success(), "{told}");
+    assert!(
+        told.contains("without --pty nobody drives the motor")
+            && told.contains("--pty --belt 0.004 --stop"),
+        "{told}"
+    );
+    assert!(!std::path::Path::new(out).exists());
 }

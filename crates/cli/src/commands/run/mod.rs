@@ -2,6 +2,7 @@
 
 mod correct;
 mod pose;
+mod times;
 
 use std::path::PathBuf;
 #[cfg(unix)]
@@ -28,6 +29,7 @@ use miette::Result;
 use model::record::Record;
 use noise::AnalyzeOptions;
 use serde::Serialize;
+use times::{Held, Span, held, span};
 use wire::LinkCounts;
 
 use super::outputs::{self, Outputs};
@@ -125,18 +127,11 @@ pub struct Arguments {
     line: Line,
 }
 
-/// A part of a run, s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span(f64, f64);
-
 /// Shortest run that is analyzed and diagnosed, s: a shorter one leaves most causes untested.
 const SHORTEST_S: f64 = 60.0;
 
 /// Longest run, s: a day.
 const LONGEST_S: f64 = 86_400.0;
-
-/// Longest part that is traced, s: a hundred megabytes.
-const LONGEST_TRACE_S: f64 = 60.0;
 
 /// Whether a run of so many seconds can be answered.
 fn length(seconds: f64) -> Result<()> {
@@ -165,34 +160,6 @@ fn longest(text: &str) -> std::result::Result<f64, String> {
     seconds.ok_or_else(|| format!("takes a length within {SHORTEST_S} .. {LONGEST_S} s"))
 }
 
-/// How long the stop is held, from and to, s.
-#[derive(Clone, Copy, Debug)]
-struct Held([f64; 2]);
-
-fn held(text: &str) -> std::result::Result<Held, String> {
-    match two_times(text) {
-        Some((from, to)) if from >= 0.0 && from < to => Ok(Held([from, to])),
-        _ => Err("takes two times of which the second is later: 20,25".to_owned()),
-    }
-}
-
-fn two_times(text: &str) -> Option<(f64, f64)> {
-    let (from, to) = text.split_once(',')?;
-    Some((from.trim().parse().ok()?, to.trim().parse().ok()?))
-}
-
-/// `0,2`.
-fn span(text: &str) -> std::result::Result<Span, String> {
-    match two_times(text) {
-        Some((from, to)) if from >= 0.0 && from < to && to - from <= LONGEST_TRACE_S => {
-            Ok(Span(from, to))
-        }
-        _ => Err(format!(
-            "takes two times of which the second is later, {LONGEST_TRACE_S} s apart at the most: 0,2"
-        )),
-    }
-}
-
 /// Where `cargo xtask image` puts it.
 pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
@@ -217,6 +184,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return serve(board, arguments);
         #[cfg(not(unix))]
         miette::bail!("this system has no pseudo-terminals: --pty works on Linux and macOS");
+    }
+    if let Some(Held([from, to])) = arguments.stop.first() {
+        misused!(
+            help = "serve the board, and drive its motor from another terminal: `imu-stand run --pty --belt 0.004 --stop 20,25`, then \
+                    `imu-stand capture --port PORT --duty 120 --out capture.csv` with the PORT that it prints",
+            "--stop {from},{to}: without --pty nobody drives the motor by hand, and what is hidden has a course of its own"
+        );
     }
     length(arguments.seconds)?;
     if arguments.out.as_os_str() == outputs::DASH {
