@@ -11,7 +11,7 @@ use super::foreign::meaning;
 use super::names::TIMES;
 use super::propose::seen::Seen;
 use super::propose::{alias, guess, nearest, times, unknown};
-use super::units::{What, in_brackets, is_angle, known};
+use super::units::{COUNTS, What, in_brackets, is_angle, known};
 use super::{CaptureError, ColumnMapping};
 
 /// Begins the name of a column in whose place the mapping names another: a name that is none of ours in any spelling.
@@ -224,6 +224,7 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
         let of_column = (guess.columns.iter())
             .find(|(ours, _)| ours.starts_with(key))
             .and_then(|(_, at)| said.units[*at].as_deref());
+        let of_column = of_column.filter(|unit| *unit != COUNTS);
         let is_given = units.iter().any(|(known, _)| known == key);
         match (*of_name).or(of_column) {
             _ if is_given => {}
@@ -242,7 +243,8 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
             quantity @ Quantity::Acc => ("acc", What::Channel(quantity)),
             _ => continue,
         };
-        let own = unit_of(&said.names[*at], what, said.names).or(said.units[*at].as_deref());
+        let of_name = unit_of(&said.names[*at], what, said.names).filter(|unit| *unit != COUNTS);
+        let own = of_name.or(said.units[*at].as_deref());
         let of_kind = (units.iter()).find(|(known, _)| known == key);
         let is_given = mapping.unit(ours, what).is_some();
         if let (Some(own), Some((_, of_kind)), false) = (own, of_kind, is_given)
@@ -307,6 +309,9 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
                 let column = &said.names[at];
                 let stated = said.units[at].as_deref();
                 let stated = stated.or_else(|| unit_of(column, what, said.names));
+                // What a count of a gyro is, is asked for.
+                let is_asked = meaning(name).0 == Quantity::Gyro;
+                let stated = stated.filter(|unit| !is_asked || *unit != COUNTS);
                 let given = mapping.unit(name, what);
                 let unit = given.or(stated);
                 is_rate(said, at, given, stated, meaning(name).0)?;

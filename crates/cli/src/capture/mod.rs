@@ -32,6 +32,7 @@ mod preamble;
 mod propose;
 mod read;
 mod rows;
+mod scales;
 mod series;
 mod several;
 mod skipped;

@@ -3,7 +3,7 @@
 use model::record::Quantity;
 
 use super::conventions::unit_of;
-use super::units::{What, in_brackets, is_unit_of};
+use super::units::{COUNTS, What, in_brackets, is_unit_of};
 
 mod by_number;
 mod meaning;
@@ -44,7 +44,8 @@ impl Guess {
         };
         // The unit of a quantity is that of its first column.
         if !self.units.iter().any(|(k, _)| *k == key) {
-            self.units.push((key, unit_of(&names[at], what, names)));
+            let said = unit_of(&names[at], what, names).filter(|unit| *unit != COUNTS);
+            self.units.push((key, said));
         }
     }
 
@@ -105,6 +106,9 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
     let meanings = meanings(names);
     if let Some(at) = time_by_name(names, &meanings, seen) {
         guess.add(names, "time", at, What::Time);
+    }
+    if let Some(at) = (0..names.len()).find(|at| seen.counts_packets(*at, &names[*at])) {
+        guess.columns.push(("seq".to_owned(), at));
     }
     let has = |kind: Kind| {
         meanings
@@ -317,6 +321,16 @@ pub(super) fn nearest(name: &str) -> Option<String> {
         Kind::Bare | Kind::Unknown if is(&["pwm", "duty", "motor"]) => Some("pwm".to_owned()),
         Kind::Bare | Kind::Unknown => None,
     }
+}
+
+/// Which columns are of gyros and which of accelerometers, by their names.
+pub(super) fn inertial(names: &[String]) -> Vec<Option<Quantity>> {
+    let of = |m: &Meaning| match m.kind {
+        Kind::Gyro => Some(Quantity::Gyro),
+        Kind::Acc => Some(Quantity::Acc),
+        _ => None,
+    };
+    meanings(names).iter().map(of).collect()
 }
 
 /// The place of the column whose name calls itself a time and says its unit, where it is the only one: `time_ms`,

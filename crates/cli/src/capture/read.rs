@@ -20,6 +20,7 @@ use super::preamble::{stated, stated_by};
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
+use super::scales::Scales;
 use super::several::Sensors;
 use super::skipped::keep_places;
 use super::span::Span;
@@ -115,6 +116,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         None => stated(&layout.said),
     };
     header.rate_hz = options.rate_hz.or(header.rate_hz);
+    let scales = Scales::take(&mut layout, &mut text)?;
     let said = Said {
         lines: &layout.lines,
         names: &layout.names,
@@ -132,17 +134,14 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 &mut layout.cells,
                 said.names.len(),
             )?;
-            return Err(proposed(
-                error,
-                &said,
-                &options.mapping,
-                said.knows_rate || said.states_rate,
-                &seen,
-            ));
+            let knows_rate = said.knows_rate || said.states_rate;
+            let error = proposed(error, &said, &options.mapping, knows_rate, &seen);
+            return Err(scales.mention(error));
         }
         Ok(found) => found,
     };
-    found.ask()?;
+    found.ask().map_err(|error| scales.mention(error))?;
+    found.notes.extend(scales.notes);
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
             "the table begins in line {}: what stands before, from line {first} on, is no part of it",
@@ -312,6 +311,14 @@ fn finish(
     let has_times = record.host_time_s.is_some() || record.t_ticks.is_some();
     if let (Some(in_words), false) = (&in_words, has_times) {
         in_words.take(&mut record, options.rate_hz);
+    }
+    if let (Some(in_words), Some(times)) = (&in_words, &mut record.host_time_s)
+        && found.time_is_assumed
+        && let Some((unit, s)) = in_words.unit_of(times)
+    {
+        times.iter_mut().for_each(|t| *t *= s);
+        found.time_is_assumed = false;
+        record.notes.push(in_words.gives(unit));
     }
     let stated = record.header.rate_hz;
     let mut record = in_order(record);

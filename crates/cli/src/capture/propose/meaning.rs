@@ -2,6 +2,7 @@
 
 use model::record::Quantity;
 
+use super::super::conventions::DATAFLASH;
 use super::super::units::{What, at_the_end, in_brackets, is_angle, is_unit_of, known};
 use super::words::{TURNS, axis_of, words};
 
@@ -46,6 +47,12 @@ pub(super) fn meanings(names: &[String]) -> Vec<Meaning> {
         others
             .iter()
             .for_each(|at| meanings[*at].kind = Kind::Unknown);
+    }
+    // ArduPilot's IMU has one letter for its temperature.
+    if names.iter().any(|name| name == DATAFLASH)
+        && let Some(at) = names.iter().position(|name| name == "T")
+    {
+        meanings[at].kind = Kind::Temp;
     }
     let at = |letter: &str| {
         (names.iter()).position(|name| in_brackets(name).0.eq_ignore_ascii_case(letter))

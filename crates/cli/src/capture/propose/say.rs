@@ -6,7 +6,7 @@ use super::super::angle::Angle;
 use super::super::columns::Said;
 use super::super::error::{brief, brief_list};
 use super::super::mapped::place;
-use super::super::units::is_angle;
+use super::super::units::{COUNTS, is_angle};
 use super::super::{CaptureError, ColumnMapping};
 use super::seen::Seen;
 use super::{Guess, alias, guess};
@@ -31,19 +31,15 @@ pub(super) struct Proposal {
 
 /// A mapping made of a file's column names. `numbered` says that the names are made up, and columns are called by their
 /// numbers; `knows_rate` that the sample rate is known without times.
+#[cfg(test)]
 pub(super) fn proposal(
     names: &[String],
     numbered: bool,
     knows_rate: bool,
     seen: &Seen,
 ) -> Proposal {
-    line_of(
-        &guess(names, numbered, seen),
-        &[],
-        names,
-        numbered,
-        knows_rate,
-    )
+    let guess = guess(names, numbered, seen);
+    line_of(&guess, &[], names, &[], numbered, knows_rate)
 }
 
 /// What was asked for, where a column of it is not there: the file's best guess stands in its place, and the time beside it, which
@@ -93,11 +89,13 @@ fn asked(guess: Guess, said: &Said<'_>, mapping: &ColumnMapping, knows_rate: boo
     }
 }
 
-/// Options of a mapping, with units that were `given` before those that are guessed.
+/// Options of a mapping, with units that were `given` before those that are guessed; what the file says of units elsewhere is
+/// taken as it is.
 fn line_of(
     guess: &Guess,
     given: &[(String, String)],
     names: &[String],
+    units_said: &[Option<String>],
     numbered: bool,
     knows_rate: bool,
 ) -> Proposal {
@@ -134,7 +132,10 @@ fn line_of(
         .map(|(key, unit)| format!("{key}={unit}"))
         .collect();
     for (key, said) in &guess.units {
-        match (*key, *said) {
+        // Lines before the table say it, or a row of units.
+        let stated = (guess.columns.iter()).find(|(ours, _)| ours.starts_with(key));
+        let stated = stated.and_then(|(_, at)| units_said.get(*at)?.as_deref());
+        match (*key, said.or(stated.filter(|unit| *unit != COUNTS))) {
             // Seconds go without saying; other times are guessed by nobody.
             ("time", None | Some("s")) => {}
             ("gyro", Some(unit)) if is_angle(unit) => {
@@ -228,6 +229,15 @@ pub(in crate::capture) fn proposed(
     let CaptureError::Columns { why, columns, .. } = error else {
         return error;
     };
+    if let Some(name) = said.names.iter().find(|name| is_labelled(name)) {
+        return CaptureError::NoText {
+            what: format!(
+                "a text whose rows repeat the names of their readings (`{}`)",
+                brief(name)
+            ),
+            help: LABELLED.to_owned(),
+        };
+    }
     let is_there = |(_, theirs): &(String, String)| place(said, theirs).is_some();
     let lacks_one = !mapping.columns.iter().all(is_there);
     if lacks_one && said.lines.get("format").is_some() {
@@ -242,18 +252,14 @@ pub(in crate::capture) fn proposed(
         open,
         twice,
         hints,
-    } = if lacks_one {
-        let guess = guess(said.names, said.numbered, seen);
-        let guess = asked(guess, said, mapping, knows_rate);
-        line_of(
-            &guess,
-            &mapping.units,
-            said.names,
-            said.numbered,
-            knows_rate,
-        )
-    } else {
-        proposal(said.names, said.numbered, knows_rate, seen)
+    } = {
+        let found = guess(said.names, said.numbered, seen);
+        let (found, given) = match lacks_one {
+            true => (asked(found, said, mapping, knows_rate), &mapping.units[..]),
+            false => (found, &[][..]),
+        };
+        let numbered = said.numbered;
+        line_of(&found, given, said.names, said.units, numbered, knows_rate)
     };
     let mut hint = String::new();
     if said.numbered {
@@ -279,6 +285,23 @@ pub(in crate::capture) fn proposed(
         hint,
         example: line,
     }
+}
+
+/// What to do with rows that repeat their names.
+const LABELLED: &str = "write the names once, in a first line, and below it numbers alone; of a log that is there already \
+                        `sed -E 's/[A-Za-z_ ]+[:=] *//g; s/ *[|] */,/g' LOG > log.csv` leaves the numbers";
+
+/// Whether what should be a column's name has its reading in it, as sketches of microcontrollers print it: `AccelX:0.09`,
+/// `AcX = 213`.
+fn is_labelled(name: &str) -> bool {
+    let is_number = |text: &str| {
+        let first = text.split_whitespace().next();
+        first.is_some_and(|word| word.parse::<f64>().is_ok())
+    };
+    let parts = name.split_once([':', '=']);
+    let has_reading = parts
+        .is_some_and(|(label, value)| label.chars().any(char::is_alphabetic) && is_number(value));
+    name == "=" || has_reading
 }
 
 /// The units from which to choose.
