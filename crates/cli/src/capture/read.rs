@@ -9,6 +9,7 @@ use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
+use super::corrected::without_unapplied;
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
@@ -298,6 +299,7 @@ fn finish(
             None => place(&mut record, column, values),
         }
     }
+    without_unapplied(&mut record);
     own_steps(&mut record);
     if !skipped.is_empty() {
         let kept = keep_places(&mut record, skipped);
