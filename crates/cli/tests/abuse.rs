@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use common::{assert_refused, assert_success, folder, run, said};
+use common::{assert_misused, assert_refused, assert_success, folder, run};
 
 /// Longer, and a person has given up; a debug build on a shared machine needs a part of it.
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -216,17 +216,28 @@ fn a_full_disk_under_standard_output_is_told() {
 }
 
 #[test]
-fn a_stop_that_nobody_could_press_is_refused_with_the_line_that_has_it() {
-    let folder = folder("a_stop_that_nobody_could_press_is_refused_with_the_line_that_has_it");
+fn what_nobody_is_there_to_do_is_refused_with_the_line_that_does_it() {
+    let folder = folder("what_nobody_is_there_to_do_is_refused_with_the_line_that_does_it");
     let out = folder.join("run.csv");
     let out = out.to_str().expect("UTF-8");
-    let refused = run(&["run", "--native", "--stop", "20,25", "--out", out]);
-    let told = said(&refused);
-    assert!(!refused.status.success(), "{told}");
-    assert!(
-        told.contains("without --pty nobody drives the motor")
-            && told.contains("--pty --belt 0.004 --stop"),
-        "{told}"
-    );
+    // Beside --out, which --pty excludes, a clap `requires` says nothing.
+    for more in [&["--out", out][..], &[]] {
+        for (option, value) in [
+            ("--stop", "20,25"),
+            ("--belt", "0.004"),
+            ("--pose", "40:+x"),
+        ] {
+            let run = ["run", "--native", option, value];
+            let expected = [
+                "goes with --pty: without it nobody is at the stand",
+                "--pty --belt 0.004",
+            ];
+            assert_misused(&self::run(&[&run[..], more].concat()), &expected);
+        }
+    }
+    for (option, value) in [("--correct-by", "model.toml"), ("--longest", "600")] {
+        let refused = run(&["run", "--native", option, value, "--details", "--out", out]);
+        assert_misused(&refused, &["goes with --correct"]);
+    }
     assert!(!std::path::Path::new(out).exists());
 }
