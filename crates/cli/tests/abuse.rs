@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use common::{assert_refused, assert_success, folder, run};
+use common::{assert_misused, assert_refused, assert_success, folder, run};
 
 /// Longer, and a person has given up; a debug build on a shared machine needs a part of it.
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -213,4 +213,31 @@ fn a_full_disk_under_standard_output_is_told() {
         .output()
         .expect("the program starts");
     assert_refused(&output, &["cannot write standard output", "make room"]);
+}
+
+#[test]
+fn what_nobody_is_there_to_do_is_refused_with_the_line_that_does_it() {
+    let folder = folder("what_nobody_is_there_to_do_is_refused_with_the_line_that_does_it");
+    let out = folder.join("run.csv");
+    let out = out.to_str().expect("UTF-8");
+    // Beside --out, which --pty excludes, a clap `requires` says nothing.
+    for more in [&["--out", out][..], &[]] {
+        for (option, value) in [
+            ("--stop", "20,25"),
+            ("--belt", "0.004"),
+            ("--pose", "40:+x"),
+        ] {
+            let run = ["run", "--native", option, value];
+            let expected = [
+                "goes with --pty: without it nobody is at the stand",
+                "--pty --belt 0.004",
+            ];
+            assert_misused(&self::run(&[&run[..], more].concat()), &expected);
+        }
+    }
+    for (option, value) in [("--correct-by", "model.toml"), ("--longest", "600")] {
+        let refused = run(&["run", "--native", option, value, "--details", "--out", out]);
+        assert_misused(&refused, &["goes with --correct"]);
+    }
+    assert!(!std::path::Path::new(out).exists());
 }

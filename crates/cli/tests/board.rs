@@ -425,7 +425,7 @@ fn the_correction_in_use_is_told_with_the_set_up() {
         "{written}{said}"
     );
     // The same again: nothing that would change.
-    let said = assert_success(&board.ask(&["correct", "--model", model, "--dry-run"]));
+    let said = assert_success(&board.ask(&["correct", model, "--dry-run"]));
     assert!(said.contains("has these numbers already"), "{said}");
     // Off until the next reset.
     assert_success(&board.ask(&["correct", "--off"]));

@@ -77,6 +77,21 @@ fn columns_are_added_where_corrected_frames_arrive_and_nothing_where_not() {
         last.ends_with(",0,,,,48879,0,1073741824,-5,0,536870912,7"),
         "{last}"
     );
+    // Captures of before have zeros there, which are read as none.
+    let before = without.replace(",0,,,,48879,0,", ",0,0,0,0,48879,0,");
+    assert_ne!(before, without);
+    for (text, is_told) in [(&before, true), (&without, false)] {
+        let read = read_from(text.as_bytes(), &ReadOptions::default()).unwrap();
+        let x = read.record.channel("corrected_x").unwrap();
+        assert!(x.values[3].is_nan() && x.values[2] == 1.0, "{:?}", x.values);
+        let told = read.record.notes.join("\n");
+        assert_eq!(
+            told.contains("1 rows have corrected rates although"),
+            is_told,
+            "{told}"
+        );
+        assert!(read.record.channel("corrected_state").is_none());
+    }
     // Of a firmware that has no attitude.
     let mut builder = RecordBuilder::new(Calibration::default());
     builder.push(&sample(0), 0.0);

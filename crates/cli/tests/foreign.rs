@@ -1,14 +1,17 @@
 //! Tables of others as text: what separates their cells, where their names and units stand, and what is said where that
 //! cannot be told. All but the errors hold the same rows, 20 ms apart: gyro x rises by 0.25 deg/s a row, y is -1 deg/s.
 
+#[path = "foreign/any_bytes.rs"]
+mod any_bytes;
 #[path = "foreign/names.rs"]
 mod names;
 #[path = "foreign/pandas.rs"]
 mod pandas;
+#[path = "foreign/times.rs"]
+mod times;
 
 use imu_stand::capture::{Read, read_from};
 use imu_stand::{CaptureError, ColumnMapping, ReadOptions};
-use proptest::prelude::*;
 
 fn options(columns: &str, units: &str) -> Result<ReadOptions, CaptureError> {
     let some = |text: &'static str| (!text.is_empty()).then_some(text);
@@ -151,39 +154,6 @@ fn our_own_names_with_a_unit_from_anywhere_need_no_mapping() {
 }
 
 #[test]
-fn time_is_read_in_its_unit_and_as_a_date_and_asked_for_where_seconds_make_no_sense() {
-    let map = "time=t,gyro_x=gx,gyro_y=gy";
-    for (unit, per_s) in [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)] {
-        let text = table("t,gx,gy\n", ",", ".", per_s, 1.0);
-        let units = format!("gyro=deg/s,time={unit}");
-        is_the_table(&read(text.as_bytes(), map, &units).expect(unit));
-        let head = format!("t_{unit},gx,gy\n");
-        let text = table(&head, ",", ".", per_s, 1.0);
-        let map = map.replace("time=t", &format!("time=t_{unit}"));
-        is_the_table(&read(text.as_bytes(), &map, "gyro=deg/s").expect(&head));
-    }
-    let text = table("t,gx,gy\n", ",", ".", 1e3, 1.0);
-    let said = error(text.as_bytes(), map, "gyro=deg/s");
-    assert!(
-        said.contains("20 s apart") && said.contains("time=ms"),
-        "{said}"
-    );
-    assert!(read(text.as_bytes(), map, "gyro=deg/s,time=s").is_ok());
-    let date = |k: usize| format!("2014-06-24 19:02:59.{:03}", 20 * k + 783);
-    let rows = (0..8).map(|k| format!("{},{},-1\n", date(k), 0.25 * k as f64));
-    let text: String = std::iter::once("t,gx,gy\n".to_owned())
-        .chain(rows)
-        .collect();
-    is_the_table(&read(text.as_bytes(), map, "gyro=deg/s").expect("dates"));
-    let said = error(
-        b"t,gx,gy\n0,1,0\n2,1,0\n1,1,0\n9,1,0\n2,2,0\n",
-        map,
-        "gyro=deg/s",
-    );
-    assert!(said.contains("first in row 3"), "{said}");
-}
-
-#[test]
 fn a_gyros_unit_is_asked_for_what_is_assumed_is_told_and_what_contradicts_itself_is_refused() {
     let map = "time=t,gyro_x=gx,gyro_y=gy";
     let text = table("t,gx,gy\n", ",", ".", 1.0, 1.0);
@@ -234,7 +204,7 @@ fn a_gyros_unit_is_asked_for_what_is_assumed_is_told_and_what_contradicts_itself
 #[test]
 fn what_is_no_text_is_named() {
     for (bytes, expected) in [
-        (&b"\xff\xfet\0,\0"[..], "UTF-16"),
+        (&b"\xff\xfe\0\0t\0\0\0"[..], "UTF-32"),
         (b"PK\x03\x04", "spreadsheet"),
         (b"PAR1", "Parquet"),
         (b"\x89HDF\r\n", "HDF5"),
@@ -365,38 +335,6 @@ fn a_file_of_another_kind_is_called_by_its_name_and_long_names_are_cut() {
 }
 
 #[test]
-fn a_boards_microseconds_go_on_when_their_32_bits_begin_again() {
-    let mut text = "micros,gx,gy\n".to_owned();
-    for k in 0..8_u64 {
-        let micros = (4_294_960_000 + 20_000 * k) % (1 << 32);
-        text += &format!("{micros},{},-1\n", 0.25 * k as f64);
-    }
-    let read = read(
-        text.as_bytes(),
-        "time=micros,gyro_x=gx,gyro_y=gy",
-        "gyro=deg/s",
-    )
-    .expect("times");
-    is_the_table(&read);
-    let notes = read.record.notes.join("; ");
-    assert!(notes.contains("begins again (1 x)"), "{notes}");
-    let said = error(text.as_bytes(), "", "");
-    assert!(
-        said.contains("time=micros") && said.contains("time=us"),
-        "{said}"
-    );
-    let said = error(
-        b"t,gx\n06/07/2026 19:02:59,1\n",
-        "time=t,gyro_x=gx",
-        "gyro=deg/s",
-    );
-    assert!(
-        said.contains("`06/07/2026 19:02:59` is no time") && said.contains("a date like"),
-        "{said}"
-    );
-}
-
-#[test]
 fn lines_before_the_table_are_passed_over_and_told() {
     let before = "Device: XYZ 3000\nSerial;1234\n\nComment, by hand\n";
     for head in ["t,gx,gy\n", "t,gx,gy\ns,deg/s,deg/s\n"] {
@@ -450,92 +388,4 @@ fn decimal_commas_between_commas_and_names_that_stand_twice_are_told() {
         said.contains("two columns are called `gx_dps`") && said.contains("gyro_x=2"),
         "{said}"
     );
-}
-
-#[test]
-fn a_column_of_dates_is_a_time_whatever_it_is_called() {
-    for name in ["date", "datetime", "UTC"] {
-        let rows = (0..8).map(|k| format!("2026-03-01T12:00:00.{:03}Z,{k}\n", 20 * k));
-        let text: String = std::iter::once(format!("{name},gx_dps\n"))
-            .chain(rows)
-            .collect();
-        let read = read(text.as_bytes(), "", "").expect(name);
-        let times = read.record.host_time_s.expect("a time");
-        assert!(
-            (times[7] - times[0] - 0.14).abs() < 1e-9,
-            "{name}: {times:?}"
-        );
-    }
-    let day = "date,time,gx_dps\n2026-03-01,12:00:00.00,1\n2026-03-01,12:00:00.02,2\n";
-    let read = read(day.as_bytes(), "", "").expect("a day and a time of day");
-    assert!(read.record.host_time_s.is_some());
-}
-
-/// Pieces that tables are made of, right and wrong.
-fn piece() -> impl Strategy<Value = Vec<u8>> {
-    let known = [
-        "# rate_hz: 20\n",
-        "# format: imu-stand-capture/1\n",
-        "# gyro_lsb_dps: 0.07\n",
-        "#t,x\n",
-        "sep=;\n",
-        "time",
-        "gyro_x",
-        "gyro_y (rad/s)",
-        "seq",
-        "t_ticks",
-        "flags",
-        ",",
-        ";",
-        "\t",
-        " ",
-        "\n",
-        "\r\n",
-        "1",
-        "-2.5",
-        "1e308",
-        "4294967296",
-        "99999999999999999999",
-        "-9223372036854775808",
-        "9223372036854775807",
-        "nan",
-        "inf",
-        "\"",
-        "''",
-        "[ns]",
-        "2014-06-24 19:02:59.78",
-        "s,deg/s\n",
-        "\u{feff}",
-        "°",
-        "%",
-        "(",
-        ")",
-    ];
-    prop_oneof![
-        8 => prop::sample::select(known.to_vec()).prop_map(|text| text.as_bytes().to_vec()),
-        1 => prop::collection::vec(any::<u8>(), 0..12),
-    ]
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
-
-    #[test]
-    fn no_bytes_make_the_reader_panic(
-        pieces in prop::collection::vec(piece(), 0..60),
-        mapping in prop::sample::select(vec![
-            ("", ""), ("", "gyro=deg/s"), ("gyro_x=1", "gyro=deg"), ("time=1,gyro_x=2", "time=ns"),
-        ]),
-        skip_bad in any::<bool>(),
-    ) {
-        let bytes = pieces.concat();
-        let mut options = options(mapping.0, mapping.1).expect("a mapping");
-        options.skip_bad = skip_bad;
-        if let Ok(read) = read_from(&bytes[..], &options) {
-            let rows = read.record.len();
-            for channel in &read.record.channels {
-                prop_assert_eq!(channel.values.len(), rows);
-            }
-        }
-    }
 }

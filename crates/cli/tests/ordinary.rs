@@ -317,6 +317,42 @@ fn each_column_has_the_unit_that_its_own_name_says() {
         notes(&sloppy, "", "gyro=deg/s").0.channels[0].values[0],
         1.0
     );
+    // Nor is any other angle differenced unasked: its unit may be a rate's, written short.
+    for (head, what) in [
+        (
+            "time_s,gyro_x [deg],gyro_y [deg]",
+            "has a rate, by its unit (deg) an angle",
+        ),
+        (
+            "time_s,Gyroscope X (rad),Gyroscope Y (rad)",
+            "has a rate, by its unit (rad) an angle",
+        ),
+        (
+            "time_s,gx [deg],gy [deg]",
+            "has an angle, and a gyro reads rates",
+        ),
+        (
+            "time_s,roll [deg],pitch [deg]",
+            "an angle of the attitude (deg)",
+        ),
+        (
+            "time_s,roll_deg,pitch_deg",
+            "as deg is an angle's (map the columns of the rates",
+        ),
+    ] {
+        let told = refusal(&format!("{head}\n{body}"), "", "");
+        let unit = if head.contains("rad") { "rad" } else { "deg" };
+        let asks =
+            told.contains(&format!("gyro={unit}/s")) && told.contains(&format!("gyro={unit}`"));
+        assert!(told.contains(what) && asks, "{head}: {told}");
+    }
+    let text_of_angles = format!("time_s,gyro_x [deg],gyro_y [deg]\n{body}");
+    let (record, _) = notes(&text_of_angles, "", "gyro=deg");
+    assert!((record.channels[0].values[0] - 100.0).abs() < 1e-6);
+    let stated =
+        format!("# unit of gyro_x: deg\n# unit of gyro_y: deg\ntime_s,gyro_x,gyro_y\n{body}");
+    let (record, _) = notes(&stated, "", "");
+    assert!((record.channels[0].values[0] - 100.0).abs() < 1e-6);
     // A unit with a number before it is not that unit.
     let told = refusal(&format!("time_s,gyro_x (0.01 deg/s),b\n{body}"), "", "");
     assert!(told.contains("gyro=UNIT"), "{told}");

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use model::record::Quantity;
 
+use super::angle::is_rate;
 use super::assumed::{contradiction, note, whose};
 use super::build::CORRECTED;
 use super::conventions::unit_of;
@@ -271,17 +272,12 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     // Where nothing says a unit, cells are counts, and so they are in columns of which the file says it.
     let is_counted = |unit: Option<&str>| unit == Some(COUNTS) || (unit.is_none() && !is_scaled);
     let has = |name: &str| names.iter().any(|n| n == name);
-    let has_time = TIMES.iter().any(|name| has(name)) || has("host_time_s") || has("t_ticks");
     // `export` tells the board's time once more, in s.
     let has_ticks =
         mapping.columns.is_empty() && has("t_ticks") && said.lines.get("tick_s").is_some();
     // It says the unit of every column.
     let is_export = has("time_s") && said.names.iter().all(|n| said.lines.unit_of(n).is_some());
-    let other_time = stated_time(said.names).or_else(|| match times(said.names)[..] {
-        [at] if !said.knows_rate => Some(at),
-        _ => None,
-    });
-    let other_time = other_time.filter(|_| !has_time);
+    let other_time = other_time(said, &names);
     let mut found = Columns {
         notes,
         ..Columns::default()
@@ -319,10 +315,9 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
                     found.columns.push(exported(at, theirs, unit));
                     continue;
                 }
-                match theirs.strip_prefix(UNASKED) {
-                    Some(theirs) => found.notes.push(in_its_place(theirs)),
-                    None => unread.push(theirs),
-                }
+                let other = theirs.strip_prefix(UNASKED);
+                found.notes.extend(other.map(in_its_place));
+                unread.extend(other.is_none().then_some(theirs));
                 continue;
             }
             _ if is_counted(unit) => {
@@ -330,6 +325,13 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
                 continue;
             }
             _ => {
+                is_rate(
+                    said,
+                    at,
+                    mapping.unit(name, What::Channel(quantity)),
+                    unit,
+                    quantity,
+                )?;
                 if unit.is_none() && quantity != Quantity::Pwm {
                     assumed.push((name.to_owned(), What::Channel(quantity)));
                 }
@@ -351,6 +353,18 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     found.assume(&assumed);
     found.notes.extend(not_read(&unread, &names));
     Ok(found)
+}
+
+/// The one column that calls itself a time, though by no name of ours.
+fn other_time(said: &Said<'_>, names: &[String]) -> Option<usize> {
+    let is_time = |name: &str| TIMES.contains(&name) || matches!(name, "host_time_s" | "t_ticks");
+    if names.iter().any(|name| is_time(name)) {
+        return None;
+    }
+    stated_time(said.names).or_else(|| match times(said.names)[..] {
+        [at] if !said.knows_rate => Some(at),
+        _ => None,
+    })
 }
 
 /// A channel of its own, of which the header says the unit, as `export` writes it.

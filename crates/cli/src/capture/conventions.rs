@@ -24,7 +24,7 @@ const WRITERS: [(&str, &str); 8] = [
 pub(super) const DATAFLASH: &str = "TimeUS";
 
 /// Columns by which a file's writer is known, and the units of others in it.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 10] = [
     // `rostopic echo -p` stamps in nanoseconds.
     ("field.angular_velocity.x", "time", "ns"),
     ("gyro_rad[0]", "timestamp", "us"),
@@ -36,6 +36,7 @@ const FILES: [(&str, &str, &str); 9] = [
     (DATAFLASH, "accx", "m/s2"),
     (DATAFLASH, "accy", "m/s2"),
     (DATAFLASH, "accz", "m/s2"),
+    (DATAFLASH, "t", "degC"),
 ];
 
 /// The unit that a column's name says of what it is mapped to, beside the other columns of its file.

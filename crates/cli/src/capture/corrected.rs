@@ -5,6 +5,38 @@ use model::record::{Axis, Quantity, Record};
 use super::CaptureError;
 use super::build::CORRECTED;
 
+/// The column of what the board says of its correction.
+pub(super) const STATE: &str = "corrected_state";
+
+/// Takes out the rates of rows whose correction was not applied, which mean nothing: captures are written without them, and
+/// older ones have zeros there. The column that says it is no measurement, and goes.
+pub(super) fn without_unapplied(record: &mut Record) {
+    let Some(at) = record.channels.iter().position(|c| c.name == STATE) else {
+        return;
+    };
+    let states = record.channels.remove(at).values;
+    let is_unapplied = |state: &f64| *state as u8 & wire::correction_state::APPLIED == 0;
+    let rows: Vec<usize> = (0..states.len())
+        .filter(|row| !states[*row].is_nan() && is_unapplied(&states[*row]))
+        .collect();
+    let mut most = 0;
+    for channel in record
+        .channels
+        .iter_mut()
+        .filter(|c| CORRECTED.contains(&c.name.as_str()))
+    {
+        let values = &mut channel.values;
+        let taken = rows.iter().filter(|row| !values[**row].is_nan()).count();
+        most = most.max(taken);
+        rows.iter().for_each(|row| values[*row] = f64::NAN);
+    }
+    if most > 0 {
+        record.notes.push(format!(
+            "{most} rows have corrected rates although the correction was not applied: they mean nothing, and are not read"
+        ));
+    }
+}
+
 /// The record with its corrected rates as the gyros, and without the rates as they were read. Rows without a corrected frame
 /// have no reading.
 ///

@@ -2,6 +2,7 @@
 
 use model::record::Quantity;
 
+use super::angle::is_rate;
 use super::assumed::contradiction;
 use super::columns::{Column, Columns, Role, Said, measured, time};
 use super::conventions::unit_of;
@@ -10,7 +11,7 @@ use super::foreign::meaning;
 use super::names::TIMES;
 use super::propose::seen::Seen;
 use super::propose::{alias, guess, nearest, times, unknown};
-use super::units::{What, in_brackets, is_angle, known};
+use super::units::{COUNTS, What, in_brackets, is_angle, known};
 use super::{CaptureError, ColumnMapping};
 
 /// Begins the name of a column in whose place the mapping names another: a name that is none of ours in any spelling.
@@ -223,13 +224,12 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
         let of_column = (guess.columns.iter())
             .find(|(ours, _)| ours.starts_with(key))
             .and_then(|(_, at)| said.units[*at].as_deref());
+        let of_column = of_column.filter(|unit| *unit != COUNTS);
         let is_given = units.iter().any(|(known, _)| known == key);
-        let of_increments = (guess.columns.iter())
-            .any(|(ours, at)| ours.starts_with(key) && is_no_angle(&said.names[*at]));
         match (*of_name).or(of_column) {
             _ if is_given => {}
-            // What they are has to be said.
-            Some(unit) if *key == "gyro" && is_angle(unit) && of_increments => {}
+            // Whether they are has to be said.
+            Some(unit) if *key == "gyro" && is_angle(unit) => {}
             Some(unit) => units.push(((*key).to_owned(), unit.to_owned())),
             // Times without a unit are held against their steps.
             None if *key == "time" => {}
@@ -243,7 +243,8 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
             quantity @ Quantity::Acc => ("acc", What::Channel(quantity)),
             _ => continue,
         };
-        let own = unit_of(&said.names[*at], what, said.names).or(said.units[*at].as_deref());
+        let of_name = unit_of(&said.names[*at], what, said.names).filter(|unit| *unit != COUNTS);
+        let own = of_name.or(said.units[*at].as_deref());
         let of_kind = (units.iter()).find(|(known, _)| known == key);
         let is_given = mapping.unit(ours, what).is_some();
         if let (Some(own), Some((_, of_kind)), false) = (own, of_kind, is_given)
@@ -308,14 +309,12 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
                 let column = &said.names[at];
                 let stated = said.units[at].as_deref();
                 let stated = stated.or_else(|| unit_of(column, what, said.names));
+                // What a count of a gyro is, is asked for.
+                let is_asked = meaning(name).0 == Quantity::Gyro;
+                let stated = stated.filter(|unit| !is_asked || *unit != COUNTS);
                 let given = mapping.unit(name, what);
                 let unit = given.or(stated);
-                if let (Some(unit), None) = (stated.filter(|u| is_angle(u)), given)
-                    && what == What::Channel(Quantity::Gyro)
-                    && is_no_angle(column)
-                {
-                    return Err(no_angle(column, unit));
-                }
+                is_rate(said, at, given, stated, meaning(name).0)?;
                 let note = contradiction(name, column, given, stated);
                 found.notes.extend(note);
                 if unit.is_none() {
@@ -334,38 +333,6 @@ pub(super) fn mapped(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns
     }
     found.assume(&assumed);
     Ok(found)
-}
-
-/// What a column's name says that it is, where it is no angle although its unit is one.
-fn what_instead(column: &str) -> Option<&'static str> {
-    let name = column.to_lowercase();
-    let has = |parts: &[&str]| parts.iter().any(|part| name.contains(part));
-    if has(&["delta", "dtheta", "dangle", "dang_", "incr"]) {
-        return Some("increments of an angle");
-    }
-    // What stands in brackets was written as a unit.
-    let is_rate = has(&["gyr", "rate", "omega", "angular"]) && in_brackets(column).1.is_none();
-    is_rate.then_some("a rate")
-}
-
-fn is_no_angle(column: &str) -> bool {
-    what_instead(column).is_some()
-}
-
-/// An error of what is not to be differenced, or to be said that it is.
-fn no_angle(column: &str, unit: &str) -> CaptureError {
-    CaptureError::Option {
-        option: "--units",
-        why: format!(
-            "by its name the column `{}` has {}, by its unit ({unit}) an angle",
-            brief(column),
-            what_instead(column).unwrap_or_default()
-        ),
-        help: format!(
-            "say which: `--units gyro={unit}/s` for a rate; `gyro={unit}` for an angle, which is differenced; for increments \
-             their size times the sample rate, `gyro=100{unit}/s` at 100 Hz"
-        ),
-    }
 }
 
 fn given_twice(column: &str, one: &str, other: &str) -> CaptureError {

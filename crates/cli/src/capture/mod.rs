@@ -32,6 +32,7 @@ mod preamble;
 mod propose;
 mod read;
 mod rows;
+mod scales;
 mod series;
 mod several;
 mod skipped;
@@ -45,6 +46,7 @@ mod tables;
 mod time;
 mod units;
 mod unpack;
+mod utf16;
 mod write;
 
 pub use build::{Calibration, RecordBuilder, SUPPLY_LSB_V, TEMP};

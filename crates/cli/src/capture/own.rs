@@ -4,6 +4,7 @@ use model::record::Quantity;
 
 use super::build::{CORRECTED, OF_CORRECTION};
 use super::columns::{Column, Columns, NONE_OF_OURS, Role, Said, is_inertial};
+use super::corrected::STATE;
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
@@ -52,7 +53,7 @@ pub(super) fn own(
     for (at, name) in names.iter().enumerate() {
         let (quantity, _) = meaning(name);
         // What the board says of its correction is no measurement.
-        if is_capture && OF_CORRECTION.contains(&name.as_str()) {
+        if is_capture && OF_CORRECTION.contains(&name.as_str()) && name != STATE {
             continue;
         }
         let role = match role_of(name, lines, is_capture)? {
@@ -125,6 +126,14 @@ fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, 
             )
         }
         (_, Quantity::Pwm) => scaled(0.0, 1.0, "1"),
+        // Which rates are none, it says; then it goes.
+        (STATE, _) if is_capture => Role::Measured {
+            quantity: Quantity::Derived,
+            unit: "1".to_owned(),
+            zero: 0.0,
+            scale: 1.0,
+            counts: false,
+        },
         (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
             quantity: Quantity::Derived,
             unit: "deg/s".to_owned(),

@@ -278,6 +278,38 @@ impl Stated {
         }
     }
 
+    /// The unit in which times that nobody gave one make this rate, and its length, s; `None` where seconds do.
+    pub fn unit_of(&self, times: &[f64]) -> Option<(&'static str, f64)> {
+        let mut steps: Vec<f64> = times.windows(2).map(|t| (t[1] - t[0]).abs()).collect();
+        steps.retain(|step| *step > 0.0);
+        let middle = steps.len() / 2;
+        if steps.is_empty() {
+            return None;
+        }
+        let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let units = [
+            ("s", 1.0),
+            ("ms", 1e-3),
+            ("0.1ms", 1e-4),
+            ("us", 1e-6),
+            ("ns", 1e-9),
+        ];
+        let found = units
+            .into_iter()
+            .find(|(_, s)| !self.differs(1.0 / (step * s)));
+        found.filter(|(unit, _)| *unit != "s")
+    }
+
+    /// Says that times are taken in this unit.
+    pub fn gives(&self, unit: &str) -> String {
+        format!(
+            "time is taken in {unit}, in which the rows come at the {} Hz that {} says (`{}`); `--units time=...` says otherwise",
+            short(self.hz),
+            self.place,
+            self.text
+        )
+    }
+
     fn differs(&self, from: f64) -> bool {
         (from / self.hz - 1.0).abs() > CONTRADICTS
     }

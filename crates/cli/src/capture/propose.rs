@@ -3,15 +3,19 @@
 use model::record::Quantity;
 
 use super::conventions::unit_of;
-use super::units::{What, at_the_end, in_brackets, is_angle, is_unit_of, known};
+use super::units::{COUNTS, What, in_brackets, is_unit_of};
 
+mod by_number;
+mod meaning;
 mod say;
 pub(super) mod seen;
 mod words;
 
+use by_number::guess_by_number;
+use meaning::{Kind, Meaning, meanings};
 pub(super) use say::{proposed, unknown};
 use seen::Seen;
-use words::{TURNS, axis_of, words};
+use words::{without_axis, words};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -23,6 +27,10 @@ pub(super) struct Guess {
     pub units: Vec<(&'static str, Option<&'static str>)>,
     /// Whether another column could be one of them, or a gyro's may be something else: the choice is then not ours.
     pub is_ambiguous: bool,
+    /// Whether the gyros have names of axes alone, as any sensor's may.
+    pub is_bare: bool,
+    /// The columns of a second IMU, where there is one.
+    pub second: Vec<(String, usize)>,
 }
 
 impl Guess {
@@ -36,7 +44,16 @@ impl Guess {
         };
         // The unit of a quantity is that of its first column.
         if !self.units.iter().any(|(k, _)| *k == key) {
-            self.units.push((key, unit_of(&names[at], what, names)));
+            let said = unit_of(&names[at], what, names).filter(|unit| *unit != COUNTS);
+            self.units.push((key, said));
+        }
+    }
+
+    /// A channel of which nothing says the column.
+    fn leave_open(&mut self, ours: &str, key: &'static str) {
+        self.columns.push((ours.to_owned(), usize::MAX));
+        if !self.units.iter().any(|(k, _)| *k == key) {
+            self.units.push((key, None));
         }
     }
 }
@@ -48,6 +65,8 @@ pub(super) fn guess(names: &[String], numbered: bool, seen: &Seen) -> Guess {
         columns: Vec::new(),
         units: Vec::new(),
         is_ambiguous: false,
+        is_bare: false,
+        second: Vec::new(),
     };
     if numbered || are_numbers(names) {
         guess_by_number(names, seen, &mut guess);
@@ -83,53 +102,83 @@ fn are_numbers(names: &[String]) -> bool {
         && meanings(names).iter().all(|m| m.kind == Kind::Unknown)
 }
 
-/// As such files usually are: a time, three gyros, three accelerometers. The time rises, and accelerometers read gravity; where
-/// no value is seen, the time is first where the number of columns is odd.
-fn guess_by_number(names: &[String], seen: &Seen, guess: &mut Guess) {
-    let all = || 0..names.len();
-    let time = match all().any(|at| seen.rises(at)) {
-        true => all().find(|at| seen.is_time(*at)),
-        false => (names.len() > 3 && names.len() != 6).then_some(0),
-    };
-    if let Some(at) = time {
-        guess.add(names, "time", at, What::Time);
-    }
-    let is_reading = |at: &usize| Some(*at) != time && !seen.rises(*at) && !seen.is_constant(*at);
-    let mut readings: Vec<usize> = all().filter(is_reading).collect();
-    if readings.is_empty() {
-        readings = all().filter(|at| Some(*at) != time).collect();
-    }
-    let (first, then) = readings.split_at(readings.len().min(AXES.len()));
-    let then = &then[..if then.len() < AXES.len() {
-        0
-    } else {
-        AXES.len()
-    }];
-    let of_triple = |of: &[usize]| match of.len() == AXES.len() {
-        true => seen.gravity(of),
-        false => None,
-    };
-    let (gyros, accs) = match (of_triple(first), of_triple(then)) {
-        (Some(_), None) => (then, first),
-        _ => (first, then),
-    };
-    for (stem, of, quantity) in [
-        ("gyro", gyros, Quantity::Gyro),
-        ("acc", accs, Quantity::Acc),
-    ] {
-        for (axis, at) in AXES.iter().zip(of) {
-            guess.add(
-                names,
-                &format!("{stem}_{axis}"),
-                *at,
-                What::Channel(quantity),
-            );
-        }
-    }
-}
-
 fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
     let meanings = meanings(names);
+    if let Some(at) = time_by_name(names, &meanings, seen) {
+        guess.add(names, "time", at, What::Time);
+    }
+    if let Some(at) = (0..names.len()).find(|at| seen.counts_packets(*at, &names[*at])) {
+        guess.columns.push(("seq".to_owned(), at));
+    }
+    let has = |kind: Kind| {
+        meanings
+            .iter()
+            .any(|m| m.kind == kind && m.axis < Some(3) && m.axis.is_some())
+    };
+    // Bare x, y, z are what the file is about, and most often a gyro here.
+    let gyro = match has(Kind::Gyro) || has(Kind::Acc) {
+        true => Kind::Gyro,
+        false => Kind::Bare,
+    };
+    guess.is_ambiguous |= gyro == Kind::Bare;
+    let bare = of_sensor(names, &meanings, Kind::Bare, &[]);
+    let places: Vec<usize> = bare.iter().map(|(_, at)| *at).collect();
+    let is_gravity = places.len() == AXES.len() && seen.reads_gravity(&places).is_some();
+    let (gyro, acc) = match gyro {
+        Kind::Bare if is_gravity => (Kind::Gyro, Kind::Bare),
+        gyro => (gyro, Kind::Acc),
+    };
+    for (kind, stem, quantity) in [(gyro, "gyro", Quantity::Gyro), (acc, "acc", Quantity::Acc)] {
+        let first = of_sensor(names, &meanings, kind, &[]);
+        let taken: Vec<usize> = first.iter().map(|(_, at)| *at).collect();
+        for (k, at) in &first {
+            let ours = format!("{stem}_{}", AXES[*k]);
+            guess.add(names, &ours, *at, What::Channel(quantity));
+            let same = |m: &&Meaning| m.kind == kind && m.axis == Some(*k);
+            guess.is_ambiguous |= meanings.iter().filter(same).count() > 1;
+        }
+        let second = of_sensor(names, &meanings, kind, &taken);
+        if second.len() == first.len() {
+            let of = second.iter();
+            let ours = of.map(|(k, at)| (format!("{stem}_{}", AXES[*k]), *at));
+            guess.second.extend(ours);
+        }
+    }
+    guess.is_bare = gyro == Kind::Bare && !bare.is_empty();
+    if guess.is_bare {
+        // What its writer delivers holds for a gyro, which nothing says that it is.
+        let is_said = bare
+            .iter()
+            .any(|(_, at)| in_brackets(&names[*at]).1.is_some());
+        let units = guess
+            .units
+            .iter_mut()
+            .filter(|(key, _)| *key == "gyro" && !is_said);
+        units.for_each(|(_, unit)| *unit = None);
+    }
+    if let Some(at) = meanings.iter().position(|m| m.kind == Kind::Temp) {
+        guess.add(names, "temp", at, What::Channel(Quantity::Temp));
+        // Beside counts it is in counts.
+        let gyros = guess
+            .columns
+            .iter()
+            .filter(|(ours, _)| ours.starts_with("gyro"));
+        let are_counts =
+            gyros.clone().count() > 0 && gyros.clone().all(|(_, at)| seen.is_whole(*at));
+        if are_counts
+            && seen.is_whole(at)
+            && unit_of(&names[at], What::Channel(Quantity::Temp), names).is_none()
+        {
+            guess.units.push(("temp", None));
+        }
+    }
+    if !has(Kind::Gyro) && !has(Kind::Acc) && bare.is_empty() {
+        by_elimination(names, &meanings, seen, guess);
+    }
+    no_rates(seen, guess);
+}
+
+fn time_by_name(names: &[String], meanings: &[Meaning], seen: &Seen) -> Option<usize> {
     let time = |with_unit: bool| {
         meanings.iter().zip(names).position(|(m, name)| {
             let says = || unit_of(name, What::Time, names).is_some();
@@ -140,83 +189,70 @@ fn guess_by_name(names: &[String], seen: &Seen, guess: &mut Guess) {
     let date = || meanings.iter().position(|m| m.kind == Kind::Date);
     let unknown = |at: &usize| meanings[*at].kind == Kind::Unknown;
     let by_value = || (0..names.len()).find(|at| unknown(at) && seen.is_time(*at));
-    if let Some(at) = time(true)
-        .or_else(|| time(false))
+    (time(true).or_else(|| time(false)))
         .or_else(date)
         .or_else(by_value)
-    {
-        guess.add(names, "time", at, What::Time);
-    }
-    let find = |kind: Kind, axis: usize| {
-        (meanings.iter()).position(|m| m.kind == kind && m.axis == Some(axis))
+}
+
+/// The axes and places of the columns of the first sensor of a kind that are not `taken`: those whose names differ in the axis
+/// alone, and where a name has no such neighbour the first of its axis.
+fn of_sensor(
+    names: &[String],
+    meanings: &[Meaning],
+    kind: Kind,
+    taken: &[usize],
+) -> Vec<(usize, usize)> {
+    let stem = |at: usize| without_axis(in_brackets(&names[at]).0);
+    let all = || {
+        let is_it = |at: &usize| meanings[*at].kind == kind && meanings[*at].axis.is_some();
+        (0..names.len())
+            .filter(is_it)
+            .filter(|at| !taken.contains(at))
     };
-    let has_gyro = (0..3).any(|axis| find(Kind::Gyro, axis).is_some());
-    let has_acc = (0..3).any(|axis| find(Kind::Acc, axis).is_some());
-    // Bare x, y, z are what the file is about, and most often a gyro here.
-    let gyro = if has_gyro || has_acc {
-        Kind::Gyro
-    } else {
-        Kind::Bare
+    let Some(first) = all().next().map(stem) else {
+        return Vec::new();
     };
-    guess.is_ambiguous |= gyro == Kind::Bare;
-    let bare: Vec<usize> = (0..3).filter_map(|axis| find(Kind::Bare, axis)).collect();
-    let is_gravity = bare.len() == AXES.len() && seen.gravity(&bare).is_some();
-    let (gyro, acc) = match gyro {
-        Kind::Bare if is_gravity => (Kind::Gyro, Kind::Bare),
-        gyro => (gyro, Kind::Acc),
+    let of_axis = |k: usize| {
+        let is_axis = |at: &usize| meanings[*at].axis == Some(k);
+        let of_first = all().filter(is_axis).find(|at| stem(*at) == first);
+        Some((k, of_first.or_else(|| all().find(is_axis))?))
     };
-    for (kind, stem, quantity) in [(gyro, "gyro", Quantity::Gyro), (acc, "acc", Quantity::Acc)] {
-        for (k, axis) in AXES.iter().enumerate() {
-            if let Some(at) = find(kind, k) {
-                let same = |m: &&Meaning| m.kind == kind && m.axis == Some(k);
-                guess.is_ambiguous |= meanings.iter().filter(same).count() > 1;
-                guess.add(
-                    names,
-                    &format!("{stem}_{axis}"),
-                    at,
-                    What::Channel(quantity),
-                );
-            }
-        }
-    }
-    if let Some(at) = meanings.iter().position(|m| m.kind == Kind::Temp) {
-        guess.add(names, "temp", at, What::Channel(Quantity::Temp));
-    }
-    if !has_gyro && !has_acc && (0..3).all(|axis| find(Kind::Bare, axis).is_none()) {
-        // A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
-        let first = |wanted: &dyn Fn(usize) -> bool| (0..meanings.len()).find(|at| wanted(*at));
-        // Nor what has a place already, or a unit of something else.
-        let taken: Vec<usize> = guess.columns.iter().map(|(_, at)| *at).collect();
-        let may_be = |at: usize| {
-            let unit = in_brackets(&names[at]).1;
-            let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro));
-            meanings[at].kind != Kind::Time && !taken.contains(&at) && unit.is_none_or(is_rate)
+    (0..AXES.len()).filter_map(of_axis).collect()
+}
+
+/// A gyro without an axis; or nothing is recognized: the form of a mapping, with the first column that is no time.
+fn by_elimination(names: &[String], meanings: &[Meaning], seen: &Seen, guess: &mut Guess) {
+    let first = |wanted: &dyn Fn(usize) -> bool| (0..meanings.len()).find(|at| wanted(*at));
+    // Nor what has a place already, or a unit of something else.
+    let taken: Vec<usize> = guess.columns.iter().map(|(_, at)| *at).collect();
+    let may_be = |at: usize| {
+        let unit = in_brackets(&names[at]).1;
+        let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro));
+        meanings[at].kind != Kind::Time && !taken.contains(&at) && unit.is_none_or(is_rate)
+    };
+    // The other axes have the same name but for the axis.
+    let stem = |at: usize| without_axis(in_brackets(&names[at]).0);
+    let triple = |at: usize| {
+        let of_axis = |axis| {
+            let mut all = (0..names.len()).filter(|k| may_be(*k));
+            all.find(|k| meanings[*k].axis == Some(axis) && stem(*k) == stem(at))
         };
-        let found = first(&|at| meanings[at].kind == Kind::Gyro)
-            .or_else(|| first(&|at| may_be(at) && !seen.rises(at)))
-            .or_else(|| first(&may_be));
-        if let Some(at) = found {
-            // The other axes have the same name but for the axis.
-            let stem = |at: usize| {
-                let mut words = words(&names[at]);
-                words.pop();
-                words
-            };
-            let of_axis = |axis| {
-                let mut all = 0..names.len();
-                all.find(|k| meanings[*k].axis == Some(axis) && stem(*k) == stem(at))
-            };
-            let of = match [0, 1, 2].map(of_axis) {
-                [Some(x), Some(y), Some(z)] if meanings[at].axis.is_some() => vec![x, y, z],
-                _ => vec![at],
-            };
-            for (axis, at) in AXES.iter().zip(of) {
-                let ours = format!("gyro_{axis}");
-                guess.add(names, &ours, at, What::Channel(Quantity::Gyro));
-            }
+        match [0, 1, 2].map(of_axis) {
+            [Some(x), Some(y), Some(z)] if meanings[at].axis.is_some() => Some(vec![x, y, z]),
+            _ => None,
+        }
+    };
+    let found = first(&|at| meanings[at].kind == Kind::Gyro)
+        .or_else(|| first(&|at| may_be(at) && triple(at).is_some()))
+        .or_else(|| first(&|at| may_be(at) && !seen.rises(at)))
+        .or_else(|| first(&may_be));
+    if let Some(at) = found {
+        let of = triple(at).unwrap_or_else(|| vec![at]);
+        for (axis, at) in AXES.iter().zip(of) {
+            let ours = format!("gyro_{axis}");
+            guess.add(names, &ours, at, What::Channel(Quantity::Gyro));
         }
     }
-    no_rates(seen, guess);
 }
 
 /// What is too small to be a rate is a channel of its own: a clock's frequency, most often.
@@ -287,6 +323,16 @@ pub(super) fn nearest(name: &str) -> Option<String> {
     }
 }
 
+/// Which columns are of gyros and which of accelerometers, by their names.
+pub(super) fn inertial(names: &[String]) -> Vec<Option<Quantity>> {
+    let of = |m: &Meaning| match m.kind {
+        Kind::Gyro => Some(Quantity::Gyro),
+        Kind::Acc => Some(Quantity::Acc),
+        _ => None,
+    };
+    meanings(names).iter().map(of).collect()
+}
+
 /// The place of the column whose name calls itself a time and says its unit, where it is the only one: `time_ms`,
 /// `timestamp_ns`.
 pub(super) fn stated_time(names: &[String]) -> Option<usize> {
@@ -318,167 +364,6 @@ pub(super) fn times(names: &[String]) -> Vec<usize> {
         times
     }
 }
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Time,
-    Date,
-    Gyro,
-    Acc,
-    Temp,
-    /// An axis of nobody knows what.
-    Bare,
-    Unknown,
-}
-
-#[derive(Debug)]
-struct Meaning {
-    kind: Kind,
-    axis: Option<usize>,
-    is_seconds: bool,
-}
-
-/// What the names of a file most probably mean, together: axes may be counted from 1 on, or be flight's p, q, r.
-fn meanings(names: &[String]) -> Vec<Meaning> {
-    let mut meanings: Vec<Meaning> = names.iter().map(|name| Meaning::of(name)).collect();
-    for kind in [Kind::Gyro, Kind::Acc, Kind::Bare] {
-        let has = |axis| (meanings.iter()).any(|m| m.kind == kind && m.axis == Some(axis));
-        // Only what is counted reaches 3.
-        if has(3) && !has(0) {
-            let of_kind = meanings.iter_mut().filter(|m| m.kind == kind);
-            of_kind.for_each(|m| m.axis = m.axis.map(|axis| axis - 1));
-        }
-    }
-    // Beside rates, what is in counts is the same as it came, and what is in an angle is the attitude.
-    let unit = |at: usize| in_brackets(&names[at]).1;
-    let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro)) && !is_angle(unit);
-    let gyros = (0..names.len()).filter(|at| meanings[*at].kind == Kind::Gyro);
-    let (rates, others): (Vec<usize>, Vec<usize>) = gyros
-        .filter(|at| unit(*at).is_some())
-        .partition(|at| unit(*at).is_some_and(is_rate));
-    if !rates.is_empty() {
-        others
-            .iter()
-            .for_each(|at| meanings[*at].kind = Kind::Unknown);
-    }
-    let at = |letter: &str| {
-        (names.iter()).position(|name| in_brackets(name).0.eq_ignore_ascii_case(letter))
-    };
-    if let [Some(p), Some(q), Some(r)] = ["p", "q", "r"].map(at) {
-        for (axis, at) in [p, q, r].into_iter().enumerate() {
-            (meanings[at].kind, meanings[at].axis) = (Kind::Gyro, Some(axis));
-        }
-    }
-    meanings
-}
-
-impl Meaning {
-    /// What a name most probably means; one within a group by itself, where the group tells nothing.
-    fn of(name: &str) -> Self {
-        let whole = Self::of_word(name);
-        match name.rsplit_once(['.', '/']) {
-            Some((_, last)) if whole.kind == Kind::Unknown && in_brackets(name).1.is_none() => {
-                Self::of_word(last)
-            }
-            _ => whole,
-        }
-    }
-
-    fn of_word(name: &str) -> Self {
-        let words = words(in_brackets(name).0);
-        // Of a letter and a number, the number counts sensors.
-        let is_number = |word: &&String| word.ends_with(|c: char| c.is_ascii_digit());
-        let axis = words
-            .iter()
-            .rev()
-            .filter(|w| !is_number(w))
-            .find_map(|w| axis_of(w));
-        let axis = axis.or_else(|| words.iter().rev().find_map(|word| axis_of(word)));
-        let is = |starts: &[&str]| (words.iter()).any(|w| starts.iter().any(|s| w.starts_with(s)));
-        let first = words.first().map_or("", String::as_str);
-        let letters = |list: &[&str]| list.contains(&first);
-        let is_seconds = known(first) == Some("s");
-        let is_of_time =
-            words.len() == 1 && known(first).is_some_and(|unit| is_unit_of(unit, What::Time));
-        let unit = in_brackets(name).1;
-        let unit_is_of = |what| unit.is_some_and(|unit| is_unit_of(unit, what));
-        let is_stamp =
-            || is(&["time", "stamp"]) && at_the_end(in_brackets(name).0, What::Time).is_some();
-        let is_time_of =
-            CLOCKS.contains(&first) && words.get(1).is_some_and(|w| w.starts_with("time"));
-        let is_called_time = is_time_of || TIME.iter().any(|s| first.starts_with(s));
-        let kind = if unit_is_of(What::Channel(Quantity::Temp)) {
-            Kind::Temp
-        } else if is_called_time && unit_is_of(What::Time) {
-            Kind::Time
-        } else if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
-            Kind::Unknown
-        } else if is(&[
-            "gyr",
-            "angular",
-            "angul",
-            "omega",
-            "rot",
-            "rate",
-            "dreh",
-            "winkelg",
-            "角速度",
-            "ジャイロ",
-        ]) || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
-        {
-            Kind::Gyro
-        } else if is(&["acc", "linear", "beschl", "加速度"]) || letters(&["a", "ax", "ay", "az"])
-        {
-            Kind::Acc
-        } else if is(&["temp", "温度"]) && !TEMPS.contains(&first) {
-            Kind::Temp
-        } else if is_called_time
-            || first == "t"
-            || is_seconds
-            || is_of_time
-            || unit_is_of(What::Time)
-            || is_stamp()
-        {
-            Kind::Time
-        } else if first == "date" || first == "utc" {
-            Kind::Date
-        } else if unit_is_of(What::Channel(Quantity::Gyro)) {
-            Kind::Gyro
-        } else if unit_is_of(What::Channel(Quantity::Acc)) {
-            Kind::Acc
-        } else if axis.is_some() && words.len() == 1 && !TURNS.contains(&first) {
-            Kind::Bare
-        } else {
-            Kind::Unknown
-        };
-        Self {
-            kind,
-            axis,
-            is_seconds,
-        }
-    }
-}
-
-/// What a time may be of.
-const CLOCKS: [&str; 11] = [
-    "elapsed",
-    "sample",
-    "system",
-    "sys",
-    "device",
-    "sensor",
-    "unix",
-    "utc",
-    "local",
-    "log",
-    "recording",
-];
-/// How the name of a time begins.
-const TIME: [&str; 9] = [
-    "time", "zeit", "stamp", "epoch", "datetime", "temps", "tiempo", "時刻", "時間",
-];
-/// Those that begin as a temperature does.
-const TEMPS: [&str; 2] = ["temps", "tempo"];
 
 #[cfg(test)]
 mod tests;

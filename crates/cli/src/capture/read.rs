@@ -9,6 +9,7 @@ use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
 use super::columns::{Column, Columns, Role, Said, columns};
+use super::corrected::without_unapplied;
 use super::error::brief;
 use super::foreign::meaning;
 use super::header::Lines;
@@ -20,6 +21,7 @@ use super::preamble::{stated, stated_by};
 use super::propose::proposed;
 use super::propose::seen::{ROWS, Seen, first_rows};
 use super::rows::RowReader;
+use super::scales::Scales;
 use super::several::Sensors;
 use super::skipped::keep_places;
 use super::span::Span;
@@ -29,6 +31,7 @@ use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
 use super::tables::read_table;
+use super::utf16::utf8;
 use super::{CaptureError, ColumnMapping};
 
 /// How to read.
@@ -102,7 +105,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         return from_table(table?, options, Of::File);
     }
     no_topics(options)?;
-    let mut text = TextLines::new(input)?;
+    let mut text = TextLines::new(utf8(input).map_err(io)?)?;
     let mut layout = Layout::read(&mut text)?;
     if layout.first.is_none() {
         // Before anything is asked of its columns.
@@ -114,6 +117,7 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         None => stated(&layout.said),
     };
     header.rate_hz = options.rate_hz.or(header.rate_hz);
+    let scales = Scales::take(&mut layout, &mut text)?;
     let said = Said {
         lines: &layout.lines,
         names: &layout.names,
@@ -131,17 +135,14 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
                 &mut layout.cells,
                 said.names.len(),
             )?;
-            return Err(proposed(
-                error,
-                &said,
-                &options.mapping,
-                said.knows_rate || said.states_rate,
-                &seen,
-            ));
+            let knows_rate = said.knows_rate || said.states_rate;
+            let error = proposed(error, &said, &options.mapping, knows_rate, &seen);
+            return Err(scales.mention(error));
         }
         Ok(found) => found,
     };
-    found.ask()?;
+    found.ask().map_err(|error| scales.mention(error))?;
+    found.notes.extend(scales.notes);
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
             "the table begins in line {}: what stands before, from line {first} on, is no part of it",
@@ -298,6 +299,7 @@ fn finish(
             None => place(&mut record, column, values),
         }
     }
+    without_unapplied(&mut record);
     own_steps(&mut record);
     if !skipped.is_empty() {
         let kept = keep_places(&mut record, skipped);
@@ -311,6 +313,14 @@ fn finish(
     let has_times = record.host_time_s.is_some() || record.t_ticks.is_some();
     if let (Some(in_words), false) = (&in_words, has_times) {
         in_words.take(&mut record, options.rate_hz);
+    }
+    if let (Some(in_words), Some(times)) = (&in_words, &mut record.host_time_s)
+        && found.time_is_assumed
+        && let Some((unit, s)) = in_words.unit_of(times)
+    {
+        times.iter_mut().for_each(|t| *t *= s);
+        found.time_is_assumed = false;
+        record.notes.push(in_words.gives(unit));
     }
     let stated = record.header.rate_hz;
     let mut record = in_order(record);

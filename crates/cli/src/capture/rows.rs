@@ -156,9 +156,10 @@ impl<'a> RowReader<'a> {
                 if matches!(column.role, Role::Time { .. }) {
                     return Err(CaptureError::Time {
                         why: format!("line {line}, column `{}`: `{}` is no time", brief(&column.name), brief(cell)),
-                        help: "a time is a number (`--units time=ms` says of what) or a date like 2026-11-21 19:02:59.78 or 21.11.2026 \
-                               19:02:59.78; where others stand in the file, leave time out and say `--rate HZ`; `--skip-bad` leaves \
-                               out single bad rows"
+                        help: "a time is a number (`--units time=ms` says of what) or a date like 2026-11-21 19:02:59.78, 21.11.2026 \
+                               19:02:59.78 or 11/21/2026 7:02:59.78 PM; where day and month can be either, write 2026-11-21; \
+                               where others stand in the file, leave time out and say `--rate HZ`; `--skip-bad` leaves out \
+                               single bad rows"
                             .to_owned(),
                     });
                 }

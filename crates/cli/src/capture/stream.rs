@@ -44,11 +44,9 @@ const UNPACK: &str = "unpack it first; gzip, Zstandard and bzip2 are read as the
 const UTF_8: &str = "save it as UTF-8 (in a spreadsheet: `CSV UTF-8`)";
 const MAVLOGDUMP: &str = "make a CSV of it by pymavlink: `mavlogdump.py --types IMU --format csv LOG > imu.csv`; the file is then read as it is";
 /// How files begin that are no text to be read, what they are, and what is to be done.
-const NO_TEXT: [(&[u8], &str, &str); 16] = [
+const NO_TEXT: [(&[u8], &str, &str); 14] = [
     (b"\xff\xfe\0\0", "UTF-32", UTF_8),
     (b"\0\0\xfe\xff", "UTF-32", UTF_8),
-    (b"\xff\xfe", "UTF-16", UTF_8),
-    (b"\xfe\xff", "UTF-16", UTF_8),
     (
         b"PK\x03\x04",
         "a ZIP archive, as spreadsheets and NPZ are",

@@ -141,7 +141,7 @@ fn avrdude() -> Found {
     };
     Found {
         what: "avrdude",
-        needed_for: "flash, beside a programmer (`imu-stand flash --dry-run` shows what it would be told)",
+        needed_for: "flash, beside a programmer (`imu-stand flash --programmer usbasp --dry-run` shows what it would be told)",
         is_there: says,
         details: version().into_iter().collect(),
         help: (!says).then(|| {

@@ -111,3 +111,19 @@ fn what_avrdude_complains_of_is_explained() {
         said(&text)
     );
 }
+
+#[test]
+fn a_dry_run_says_that_a_serial_programmer_needs_a_port() {
+    let folder = folder("a_dry_run_says_that_a_serial_programmer_needs_a_port");
+    let image = folder.join("image.hex");
+    std::fs::write(&image, ":00000001FF\n").expect("room");
+    let image = image.to_str().expect("UTF-8");
+    let dry = |more: &[&str]| {
+        let flash = ["flash", image, "--dry-run", "--programmer", "avrisp"];
+        let done = run(&[&flash[..], more].concat());
+        assert!(done.status.success(), "{}", said(&done));
+        String::from_utf8_lossy(&done.stdout).into_owned()
+    };
+    assert!(dry(&[]).starts_with("# avrisp is on a serial line: say which, `--programmer-port"));
+    assert!(!dry(&["--programmer-port", "/dev/ttyUSB0"]).contains("serial line"));
+}

@@ -41,7 +41,12 @@ fn names_that_say_what_they_are_and_in_which_unit_need_no_mapping() {
     // A logger for phones has x, y, z in the file of each sensor: they may be an accelerometer's.
     let bare = table("seconds_elapsed,x,y\n", ",", ".", 1.0, RAD);
     let said = error(bare.as_bytes(), "", "");
-    assert!(said.contains("--units gyro=rad/s"), "{said}");
+    assert!(
+        said.contains("--units gyro=UNIT") && said.contains("of an accelerometer write acc_x"),
+        "{said}"
+    );
+    let of_gyro = "time=seconds_elapsed,gyro_x=x,gyro_y=y";
+    is_the_table(&read(bare.as_bytes(), of_gyro, "").expect("a phone's gyro"));
     // Two that could be one are a choice.
     let two = "Time (s),imu0.gyro.x (rad/s),imu1.gyro.x (rad/s)\n0,1,2\n1,1,2\n";
     let said = error(two.as_bytes(), "", "");

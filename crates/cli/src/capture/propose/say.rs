@@ -2,9 +2,11 @@
 
 use crate::text::shell_word;
 
+use super::super::angle::Angle;
 use super::super::columns::Said;
 use super::super::error::{brief, brief_list};
 use super::super::mapped::place;
+use super::super::units::{COUNTS, is_angle};
 use super::super::{CaptureError, ColumnMapping};
 use super::seen::Seen;
 use super::{Guess, alias, guess};
@@ -23,23 +25,21 @@ pub(super) struct Proposal {
     pub open: Vec<&'static str>,
     /// A name that two columns have, one of them in it.
     pub twice: Option<String>,
+    /// What else has to be known of the columns.
+    pub hints: Vec<String>,
 }
 
 /// A mapping made of a file's column names. `numbered` says that the names are made up, and columns are called by their
 /// numbers; `knows_rate` that the sample rate is known without times.
+#[cfg(test)]
 pub(super) fn proposal(
     names: &[String],
     numbered: bool,
     knows_rate: bool,
     seen: &Seen,
 ) -> Proposal {
-    line_of(
-        &guess(names, numbered, seen),
-        &[],
-        names,
-        numbered,
-        knows_rate,
-    )
+    let guess = guess(names, numbered, seen);
+    line_of(&guess, &[], names, &[], numbered, knows_rate)
 }
 
 /// What was asked for, where a column of it is not there: the file's best guess stands in its place, and the time beside it, which
@@ -84,14 +84,18 @@ fn asked(guess: Guess, said: &Said<'_>, mapping: &ColumnMapping, knows_rate: boo
         columns,
         units,
         is_ambiguous: guess.is_ambiguous,
+        is_bare: guess.is_bare,
+        second: Vec::new(),
     }
 }
 
-/// Options of a mapping, with units that were `given` before those that are guessed.
+/// Options of a mapping, with units that were `given` before those that are guessed; what the file says of units elsewhere is
+/// taken as it is.
 fn line_of(
     guess: &Guess,
     given: &[(String, String)],
     names: &[String],
+    units_said: &[Option<String>],
     numbered: bool,
     knows_rate: bool,
 ) -> Proposal {
@@ -118,17 +122,40 @@ fn line_of(
             format!("{ours}={name}")
         }
     };
-    let mut open = Vec::new();
+    let name_of = |key: &str| {
+        let of = (guess.columns.iter()).find(|(ours, _)| ours.starts_with(key));
+        let name = of.and_then(|(_, at)| names.get(*at));
+        name.map_or("", String::as_str)
+    };
+    let (mut open, mut hints) = (Vec::new(), Vec::new());
     let mut units: Vec<String> = (given.iter())
         .map(|(key, unit)| format!("{key}={unit}"))
         .collect();
     for (key, said) in &guess.units {
-        match (*key, *said) {
+        // Lines before the table say it, or a row of units.
+        let stated = (guess.columns.iter()).find(|(ours, _)| ours.starts_with(key));
+        let stated = stated.and_then(|(_, at)| units_said.get(*at)?.as_deref());
+        match (*key, said.or(stated.filter(|unit| *unit != COUNTS))) {
             // Seconds go without saying; other times are guessed by nobody.
             ("time", None | Some("s")) => {}
+            ("gyro", Some(unit)) if is_angle(unit) => {
+                open.push("angle");
+                units.push(format!("gyro={UNIT}"));
+                hints.push(format!(
+                    "put in the unit, as {unit} is an angle's ({})",
+                    Angle::of(name_of("gyro")).help(unit)
+                ));
+            }
             (key, Some(unit)) => units.push(format!("{key}={unit}")),
             ("freq", None) => units.push("freq=1".to_owned()),
             (key, None) => {
+                let is_angle = || Angle::of(name_of("gyro")) == Angle::Attitude;
+                if key == "gyro" && is_angle() {
+                    hints.push(format!(
+                        "so called are angles, most often: {}",
+                        Angle::Attitude.help("deg")
+                    ));
+                }
                 open.push(key);
                 units.push(format!("{key}={UNIT}"));
             }
@@ -143,7 +170,42 @@ fn line_of(
     if !has_time && !knows_rate {
         line += " --rate HZ";
     }
-    Proposal { line, open, twice }
+    hints.extend(hints_of(guess, numbered, &column));
+    Proposal {
+        line,
+        open,
+        twice,
+        hints,
+    }
+}
+
+/// What else has to be known of the columns.
+fn hints_of(
+    guess: &Guess,
+    numbered: bool,
+    column: &dyn Fn(&(String, usize)) -> String,
+) -> Vec<String> {
+    let mut hints = Vec::new();
+    if guess.columns.iter().any(|(_, at)| *at == usize::MAX) && numbered {
+        hints.push(format!(
+            "put in each {COLUMN}: their order says no sensor, and none reads gravity in a unit"
+        ));
+    }
+    if guess.is_bare {
+        hints.push("x, y, z may be of any sensor: of an accelerometer write acc_x, acc_y, acc_z; a phone's gyro is in rad/s".to_owned());
+    }
+    if guess
+        .second
+        .iter()
+        .any(|(ours, _)| ours.starts_with("gyro"))
+    {
+        let second: Vec<String> = guess.second.iter().map(column).collect();
+        hints.push(format!(
+            "the file has a second gyro: read it in a run of its own, with {} in place of the first",
+            shell_word(&second.join(","))
+        ));
+    }
+    hints
 }
 
 /// An error of columns that mean nothing here; a mapping is [`proposed`] once rows are seen.
@@ -167,6 +229,15 @@ pub(in crate::capture) fn proposed(
     let CaptureError::Columns { why, columns, .. } = error else {
         return error;
     };
+    if let Some(name) = said.names.iter().find(|name| is_labelled(name)) {
+        return CaptureError::NoText {
+            what: format!(
+                "a text whose rows repeat the names of their readings (`{}`)",
+                brief(name)
+            ),
+            help: LABELLED.to_owned(),
+        };
+    }
     let is_there = |(_, theirs): &(String, String)| place(said, theirs).is_some();
     let lacks_one = !mapping.columns.iter().all(is_there);
     if lacks_one && said.lines.get("format").is_some() {
@@ -176,18 +247,19 @@ pub(in crate::capture) fn proposed(
             help: "leave it out: the file is a capture, and all of its columns are read".to_owned(),
         };
     }
-    let Proposal { line, open, twice } = if lacks_one {
-        let guess = guess(said.names, said.numbered, seen);
-        let guess = asked(guess, said, mapping, knows_rate);
-        line_of(
-            &guess,
-            &mapping.units,
-            said.names,
-            said.numbered,
-            knows_rate,
-        )
-    } else {
-        proposal(said.names, said.numbered, knows_rate, seen)
+    let Proposal {
+        line,
+        open,
+        twice,
+        hints,
+    } = {
+        let found = guess(said.names, said.numbered, seen);
+        let (found, given) = match lacks_one {
+            true => (asked(found, said, mapping, knows_rate), &mapping.units[..]),
+            false => (found, &[][..]),
+        };
+        let numbered = said.numbered;
+        line_of(&found, given, said.names, said.units, numbered, knows_rate)
     };
     let mut hint = String::new();
     if said.numbered {
@@ -199,6 +271,7 @@ pub(in crate::capture) fn proposed(
             brief(&name)
         );
     }
+    hints.iter().for_each(|of| hint += &format!("; {of}"));
     let asked: Vec<&str> = open.iter().filter_map(|key| choices(key)).collect();
     if !asked.is_empty() {
         hint += &format!(
@@ -214,6 +287,23 @@ pub(in crate::capture) fn proposed(
     }
 }
 
+/// What to do with rows that repeat their names.
+const LABELLED: &str = "write the names once, in a first line, and below it numbers alone; of a log that is there already \
+                        `sed -E 's/[A-Za-z_ ]+[:=] *//g; s/ *[|] */,/g' LOG > log.csv` leaves the numbers";
+
+/// Whether what should be a column's name has its reading in it, as sketches of microcontrollers print it: `AccelX:0.09`,
+/// `AcX = 213`.
+fn is_labelled(name: &str) -> bool {
+    let is_number = |text: &str| {
+        let first = text.split_whitespace().next();
+        first.is_some_and(|word| word.parse::<f64>().is_ok())
+    };
+    let parts = name.split_once([':', '=']);
+    let has_reading = parts
+        .is_some_and(|(label, value)| label.chars().any(char::is_alphabetic) && is_number(value));
+    name == "=" || has_reading
+}
+
 /// The units from which to choose.
 fn choices(key: &str) -> Option<&'static str> {
     match key {
@@ -221,6 +311,9 @@ fn choices(key: &str) -> Option<&'static str> {
             Some("gyro: deg/s, rad/s as phones and ROS have it, or what a count is: `0.0076deg/s`")
         }
         "acc" => Some("acc: m/s2, g, mg, or what a count is"),
+        "temp" => Some(
+            "temp: degC, or what a count is, `0.1degC`; leave temp out where 0 counts are not 0 degC",
+        ),
         _ => None,
     }
 }

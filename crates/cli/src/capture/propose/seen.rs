@@ -16,6 +16,9 @@ const OF_GRAVITY: f64 = 0.1;
 /// Largest reading below which it is no sensor's of rates, deg/s or rad/s: earth turns 70 times as fast in rad/s.
 const NO_RATE: f64 = 1e-6;
 
+/// What numbers of packets in 16 bits are called, by Xsens and Analog Devices.
+const PACKETS: [&str; 4] = ["packetcounter", "counter", "datacntr", "datacounter"];
+
 /// The first rows of a file, column by column; a cell that is no number is NaN.
 #[derive(Default)]
 pub(in crate::capture) struct Seen(pub Vec<Vec<f64>>);
@@ -38,6 +41,20 @@ impl Seen {
         self.of(at).is_some_and(counts)
     }
 
+    /// Whether it numbers packets in 16 bits, as its name says: a step is one, but where some were lost.
+    pub fn counts_packets(&self, at: usize, name: &str) -> bool {
+        let letters = name.chars().filter(char::is_ascii_alphanumeric);
+        let letters: String = letters.flat_map(char::to_lowercase).collect();
+        let counts = |v: &[f64]| {
+            let steps = v.windows(2).map(|w| (w[1] - w[0]).rem_euclid(65_536.0));
+            let ones = steps.clone().filter(|step| *step == 1.0).count();
+            let most = v.iter().copied().fold(0.0, f64::max);
+            let is_16_bit = most < 65_536.0 && (most > 255.0 || letters != "counter");
+            is_16_bit && steps.clone().all(|step| step > 0.0) && 10 * ones > 9 * (v.len() - 1)
+        };
+        PACKETS.contains(&letters.as_str()) && self.of(at).is_some_and(counts)
+    }
+
     /// Whether it is a time: it rises, and does not number the rows.
     pub fn is_time(&self, at: usize) -> bool {
         self.rises(at) && !self.counts(at)
@@ -55,8 +72,31 @@ impl Seen {
         self.of(at).is_some_and(|v| largest(v) < NO_RATE)
     }
 
-    /// The unit in which three columns read gravity; `None` where they do not.
+    /// Whether all of its numbers are whole.
+    pub fn is_whole(&self, at: usize) -> bool {
+        let whole = |v: &[f64]| v.iter().all(|x| x.fract() == 0.0 || x.is_nan());
+        self.of(at).is_some_and(whole)
+    }
+
+    /// Whether it holds text: it has rows, and no number.
+    pub fn is_text(&self, at: usize) -> bool {
+        self.of(at).is_some_and(|v| v.iter().all(|x| x.is_nan()))
+    }
+
+    /// Whether there are rows to go by.
+    pub fn has_rows(&self) -> bool {
+        self.of(0).is_some()
+    }
+
+    /// The unit in which three columns read gravity; `None` where they do not, and where a part of 1024 counts a g does, too.
     pub fn gravity(&self, of: &[usize]) -> Option<&'static str> {
+        let is_counted = of.iter().all(|at| self.is_whole(*at));
+        self.reads_gravity(of)
+            .filter(|unit| *unit != "mg" || !is_counted)
+    }
+
+    /// The unit in which three columns most probably read gravity; `None` where they do not.
+    pub fn reads_gravity(&self, of: &[usize]) -> Option<&'static str> {
         let means: Option<Vec<f64>> = of
             .iter()
             .map(|at| {

@@ -73,7 +73,7 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
         ),
         (
             "time;seconds_elapsed;z;y;x",
-            "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=rad/s",
+            "--columns time=seconds_elapsed,gyro_x=x,gyro_y=y,gyro_z=z --units gyro=UNIT",
         ),
         (
             "t;GyroX;GyroY;GyroZ;AccX;MagX",
@@ -123,16 +123,7 @@ fn a_proposal_maps_each_axis_to_its_own_column_with_the_headers_units_and_quotes
         ("y", "--columns gyro_y=y --units gyro=UNIT"),
         ("values", "--columns gyro_x=values --units gyro=UNIT"),
     ];
-    for (names, expected) in cases {
-        let names: Vec<String> = names.split(';').map(str::to_owned).collect();
-        let proposed = proposal(&names, false, true, &Seen::default());
-        assert_eq!(proposed.line, expected);
-        assert_eq!(
-            !proposed.open.is_empty(),
-            expected.contains("=UNIT"),
-            "{names:?}"
-        );
-    }
+    are_proposed(&cases);
     let numbered = |n: usize| proposal(&vec![String::new(); n], true, true, &Seen::default()).line;
     assert_eq!(numbered(1), "--columns gyro_x=1 --units gyro=UNIT");
     assert_eq!(
@@ -195,6 +186,25 @@ fn a_table_without_names_is_proposed_by_what_its_values_are() {
             flat(vec![still().into(), down(1000.0).into()]),
             "--columns gyro_x=1,gyro_y=2,gyro_z=3,acc_x=4,acc_y=5,acc_z=6 --units gyro=UNIT,acc=mg",
         ),
+        // A thermometer between; counts, of which none is gravity; a magnetometer beside.
+        (
+            flat(vec![
+                vec![Time(0.01)],
+                down(9.81).into(),
+                vec![Noise(25.0)],
+                still().into(),
+            ]),
+            "--columns time=1,gyro_x=COLUMN,gyro_y=COLUMN,gyro_z=COLUMN,acc_x=2,acc_y=3,acc_z=4 --units gyro=UNIT,acc=m/s2",
+        ),
+        (
+            flat(vec![down(16384.0).into(), still().into()]),
+            "--columns gyro_x=COLUMN,gyro_y=COLUMN,gyro_z=COLUMN,acc_x=COLUMN,acc_y=COLUMN,acc_z=COLUMN --units \
+             gyro=UNIT,acc=UNIT",
+        ),
+        (
+            flat(vec![down(300.0).into(), down(9.81).into(), still().into()]),
+            "--columns gyro_x=COLUMN,gyro_y=COLUMN,gyro_z=COLUMN,acc_x=4,acc_y=5,acc_z=6 --units gyro=UNIT,acc=m/s2",
+        ),
     ];
     for (columns, expected) in cases {
         let (names, seen) = seen(&columns);
@@ -249,5 +259,80 @@ fn gravity_tells_the_accelerometer_where_axes_have_no_other_name() {
     assert_eq!(
         proposal(&names, false, false, &values).line,
         "--columns time=seconds_elapsed,acc_x=x,acc_y=y,acc_z=z --units acc=m/s2"
+    );
+}
+
+/// Lists of names, and what is proposed of them.
+fn are_proposed(cases: &[(&str, &str)]) {
+    for (names, expected) in cases {
+        let names: Vec<String> = names.split(';').map(str::to_owned).collect();
+        let proposed = proposal(&names, false, true, &Seen::default());
+        assert_eq!(proposed.line, *expected);
+        assert_eq!(
+            !proposed.open.is_empty(),
+            expected.contains("=UNIT"),
+            "{names:?}"
+        );
+    }
+}
+
+#[test]
+fn the_axes_of_one_sensor_are_proposed_and_angles_leave_their_unit_open() {
+    are_proposed(&[
+        // An angle may be a rate whose unit was written short.
+        (
+            "time_s;roll_deg;pitch_deg;yaw_deg",
+            "--columns time=time_s,gyro_x=roll_deg,gyro_y=pitch_deg,gyro_z=yaw_deg --units gyro=UNIT",
+        ),
+        (
+            "time_s;Euler_X (deg);Euler_Y (deg);Euler_Z (deg)",
+            "--columns 'time=time_s,gyro_x=Euler_X (deg),gyro_y=Euler_Y (deg),gyro_z=Euler_Z (deg)' --units gyro=UNIT",
+        ),
+        // The axes of one sensor, not the first of each.
+        (
+            "t;b.gyro_y;b.gyro_z;a.gyro_x;a.gyro_y;b.gyro_x;a.gyro_z",
+            "--columns time=t,gyro_x=b.gyro_x,gyro_y=b.gyro_y,gyro_z=b.gyro_z --units gyro=UNIT",
+        ),
+        (
+            "t;gx1;gy1;gz1;gx2;gy2;gz2",
+            "--columns time=t,gyro_x=gx1,gyro_y=gy1,gyro_z=gz1 --units gyro=UNIT",
+        ),
+    ]);
+}
+
+#[test]
+fn a_second_imu_is_told_with_its_columns() {
+    let names = "t;imu0.gx;imu0.gy;imu0.gz;imu0.ax;imu0.ay;imu0.az;imu1.gx;imu1.gy;imu1.gz;imu1.ax;imu1.ay;imu1.az";
+    let names: Vec<String> = names.split(';').map(str::to_owned).collect();
+    let proposed = proposal(&names, false, false, &Seen::default());
+    let hint = proposed.hints.join("; ");
+    assert!(proposed.line.contains("gyro_x=imu0.gx") && !proposed.line.contains("imu1"));
+    let second =
+        "gyro_x=imu1.gx,gyro_y=imu1.gy,gyro_z=imu1.gz,acc_x=imu1.ax,acc_y=imu1.ay,acc_z=imu1.az";
+    assert!(
+        hint.contains("a second gyro") && hint.contains(second),
+        "{hint}"
+    );
+    let hints = proposal(&names[..7], false, false, &Seen::default()).hints;
+    assert!(hints.is_empty(), "{hints:?}");
+}
+
+#[test]
+fn whole_numbers_beside_counts_are_no_unit_that_nobody_says() {
+    let whole = |middle: f64| (0..50).map(|k| middle + f64::from(k * 7 % 5)).collect();
+    let names = ["gx", "gy", "gz", "ax", "ay", "az", "temp"].map(str::to_owned);
+    let seen = Seen(
+        [40.0, -70.0, 20.0, 9.0, -21.0, 1020.0, 253.0]
+            .map(whole)
+            .into(),
+    );
+    // 1024 counts a g are near 1000 mg, and 253 counts may be 25.3 degC.
+    let proposed = proposal(&names, false, true, &seen);
+    assert!(
+        proposed
+            .line
+            .ends_with("--units gyro=UNIT,acc=UNIT,temp=UNIT"),
+        "{}",
+        proposed.line
     );
 }

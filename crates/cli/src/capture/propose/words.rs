@@ -10,6 +10,10 @@ pub(super) fn axis_of(word: &str) -> Option<usize> {
     if let Some(axis) = TURNS.iter().position(|turn| *turn == word) {
         return Some(axis);
     }
+    // The number of a sensor stands behind an axis: `gx1`, `acc_z2`.
+    let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_numbered = bare.len() < word.len() && bare.ends_with(['x', 'y', 'z']);
+    let word = if is_numbered { bare } else { word };
     let stem = word.trim_end_matches(['x', 'y', 'z', '0', '1', '2', '3']);
     let known = [
         "",
@@ -67,4 +71,26 @@ pub(super) fn words(name: &str) -> Vec<String> {
         None => vec![word],
     };
     words.into_iter().flat_map(split).collect()
+}
+
+/// The words of a name without its axis: the same for all axes of one sensor, and another for another one.
+pub(super) fn without_axis(name: &str) -> Vec<String> {
+    let mut words = words(name);
+    let is_number = |word: &String| word.ends_with(|c: char| c.is_ascii_digit());
+    let has_axis = |word: &String| axis_of(word).is_some();
+    let at = (words.iter().rposition(|w| has_axis(w) && !is_number(w)))
+        .or_else(|| words.iter().rposition(has_axis));
+    if let Some(at) = at {
+        let word = words[at].clone();
+        let number = word.trim_start_matches(|c: char| !c.is_ascii_digit());
+        let letters = &word[..word.len() - number.len()];
+        let stem = match letters.strip_suffix(['x', 'y', 'z']) {
+            Some(stem) => format!("{stem}{number}"),
+            None if TURNS.contains(&letters) => String::new(),
+            None => letters.to_owned(),
+        };
+        words[at] = stem;
+    }
+    words.retain(|word| !word.is_empty());
+    words
 }

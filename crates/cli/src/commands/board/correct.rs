@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use imu_stand::correct::{Change, Proposed};
 use miette::Result;
 use serde::Serialize;
@@ -12,19 +12,33 @@ use super::Session;
 
 /// What `correct` takes.
 #[derive(Args)]
+#[command(
+    group = ArgGroup::new("what").args(["file", "model", "off", "on"]).required(true),
+    group = ArgGroup::new("by").args(["file", "model"])
+)]
 pub struct Arguments {
     /// A model file (`diagnose --model-out`)
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["off", "on"])]
-    pub(super) model: Option<PathBuf>,
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+    /// The same, by its name
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// Say what would be written, old and new, and write nothing
-    #[arg(long, requires = "model")]
+    #[arg(long, requires = "by")]
     dry_run: bool,
     /// No corrected frames until the next reset
-    #[arg(long, conflicts_with_all = ["model", "on"])]
+    #[arg(long)]
     off: bool,
     /// Apply the stored correction again, with the bias filter started anew
-    #[arg(long, conflicts_with = "model")]
+    #[arg(long)]
     on: bool,
+}
+
+impl Arguments {
+    /// The model file, named in either way.
+    pub(super) fn model(&self) -> Option<&PathBuf> {
+        self.file.as_ref().or(self.model.as_ref())
+    }
 }
 
 #[derive(Serialize)]
@@ -37,7 +51,7 @@ struct Answer {
 }
 
 pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
-    let Some(path) = &arguments.model else {
+    let Some(path) = arguments.model() else {
         let on = arguments.on;
         session.link.ask(Command::Correction { on })?;
         if on {

@@ -75,7 +75,7 @@ enum Action {
     BringUp(bring_up::Arguments),
     /// Write the correction of a model file to the board, which applies it from then on
     #[command(
-        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml --dry-run\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml\n  imu-stand board --port /dev/ttyUSB0 correct --off"
+        after_help = "Examples:\n  imu-stand board --port /dev/ttyUSB0 correct model.toml --dry-run\n  imu-stand board --port /dev/ttyUSB0 correct --model model.toml\n  imu-stand board --port /dev/ttyUSB0 correct --off"
     )]
     Correct(correct::Arguments),
     /// Turn the motor for as long as this program runs; Ctrl-C stops it
@@ -162,7 +162,7 @@ fn understood(action: &Action) -> Result<()> {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let reads = match &arguments.action {
         Action::Calibrate(calibrate) => calibrate.reads(),
-        Action::Correct(correct) => correct.model.as_ref(),
+        Action::Correct(correct) => correct.model(),
         _ => None,
     };
     let outputs = super::Outputs::beside(reads).result("--json", arguments.json.as_ref())?;

@@ -36,7 +36,40 @@ pub struct Said {
     pub err: String,
 }
 
+/// Programmers on a serial line, which avrdude looks for at its own default port where none is named.
+const SERIAL: [&str; 17] = [
+    "arduino",
+    "arduino_as_isp",
+    "avr109",
+    "avr910",
+    "avr911",
+    "avrisp",
+    "avrispv2",
+    "buspirate",
+    "butterfly",
+    "jtag1",
+    "jtagmkI",
+    "mib510",
+    "stk500",
+    "stk500v1",
+    "stk500v2",
+    "urclock",
+    "wiring",
+];
+
 impl Programmer {
+    /// What is missing in the calls: the port of a serial programmer.
+    pub fn lacks_port(&self) -> Option<String> {
+        let is_serial = SERIAL.contains(&self.programmer.as_str());
+        (is_serial && self.programmer_port.is_none()).then(|| {
+            format!(
+                "{} is on a serial line: say which, `--programmer-port /dev/ttyUSB0` (COM3 on Windows); without it avrdude takes \
+                 its own default port, where most often there is none",
+                self.programmer
+            )
+        })
+    }
+
     /// Arguments of a call with these operations (`-U`).
     pub fn arguments(&self, operations: &[String]) -> Vec<String> {
         let mut out: Vec<String> = ["-p", "m16", "-c", &self.programmer]
@@ -157,6 +190,25 @@ mod tests {
             programmer.call(&[operation]),
             r"avrdude -p m16 -c stk500v1 -P /dev/ttyUSB0 -b 19200 -B 10 -U 'flash:w:my image'\''s.hex:i'"
         );
+    }
+
+    #[test]
+    fn a_serial_programmer_without_a_port_is_told() {
+        let of = |name: &str, port: Option<&str>| {
+            let programmer = Programmer {
+                programmer: name.to_owned(),
+                programmer_port: port.map(str::to_owned),
+                programmer_baud: None,
+                bit_clock_us: 10.0,
+                avrdude: "avrdude".into(),
+            };
+            programmer.lacks_port()
+        };
+        let said = of("avrisp", None).expect("no port");
+        assert!(said.contains("--programmer-port /dev/ttyUSB0"), "{said}");
+        assert_eq!(of("avrisp", Some("/dev/ttyS0")), None);
+        assert_eq!(of("usbasp", None), None);
+        assert_eq!(of("avrispmkII", None), None);
     }
 
     #[test]

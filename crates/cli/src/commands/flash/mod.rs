@@ -189,6 +189,9 @@ fn may_be_flashed(arguments: &Arguments, answer: &Answer) -> Result<()> {
 /// Prints the calls.
 fn dry_run(arguments: &Arguments, image: &Image) {
     let programmer = &arguments.programmer;
+    if let Some(lack) = programmer.lacks_port() {
+        say!("# {lack}");
+    }
     say!(
         "# fuses and lock bits are read first; where the board needs others, nothing is written without --write-fuses"
     );

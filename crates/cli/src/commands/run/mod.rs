@@ -2,6 +2,7 @@
 
 mod correct;
 mod pose;
+mod times;
 
 use std::path::PathBuf;
 #[cfg(unix)]
@@ -28,6 +29,7 @@ use miette::Result;
 use model::record::Record;
 use noise::AnalyzeOptions;
 use serde::Serialize;
+use times::{Held, Span, held, span};
 use wire::LinkCounts;
 
 use super::outputs::{self, Outputs};
@@ -48,13 +50,13 @@ pub struct Arguments {
     pty: bool,
     /// With --pty: how somebody turns the stand over, as times, s, and what points up: `40:+x,80:-x,120:0.1,0,1`. Each turn
     /// takes 2 s
-    #[arg(long, value_name = "TIME:UP,...", requires = "pty", value_parser = pose::parse)]
+    #[arg(long, value_name = "TIME:UP,...", value_parser = pose::parse)]
     pose: Option<pose::Poses>,
     /// With --pty: the belt is on, and the table makes so many turns for each turn of the motor; a real one some 0.004
-    #[arg(long, value_name = "RATIO", requires = "pty", default_value_t = 0.0)]
+    #[arg(long, value_name = "RATIO", default_value_t = 0.0)]
     belt: f64,
     /// With --pty: somebody holds the motor's stop pressed, FROM,TO in s; may be given again for a later time
-    #[arg(long, value_name = "FROM,TO", requires = "pty", value_parser = held)]
+    #[arg(long, value_name = "FROM,TO", value_parser = held)]
     stop: Vec<Held>,
     /// Write the traces of the board's pins as a value change dump, to lay beside a logic analyser; needs the image, not
     /// --native
@@ -91,11 +93,11 @@ pub struct Arguments {
     #[arg(long, conflicts_with_all = ["pty", "model", "analysis", "report", "details"])]
     correct: bool,
     /// Correct by this model file instead of what was found, to see what it is worth now
-    #[arg(long, value_name = "FILE", requires = "correct")]
+    #[arg(long, value_name = "FILE")]
     correct_by: Option<PathBuf>,
     /// With --correct: the first record is taken again where its correction would be too unsure, as long as that needs, up to
     /// this length, s; 12 times --seconds if not said
-    #[arg(long, value_name = "SECONDS", requires = "correct", value_parser = longest)]
+    #[arg(long, value_name = "SECONDS", value_parser = longest)]
     longest: Option<f64>,
     /// The capture to write, .csv or .csv.gz
     #[arg(long, default_value = "capture.csv")]
@@ -125,18 +127,42 @@ pub struct Arguments {
     line: Line,
 }
 
-/// A part of a run, s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span(f64, f64);
-
 /// Shortest run that is analyzed and diagnosed, s: a shorter one leaves most causes untested.
 const SHORTEST_S: f64 = 60.0;
 
 /// Longest run, s: a day.
 const LONGEST_S: f64 = 86_400.0;
 
-/// Longest part that is traced, s: a hundred megabytes.
-const LONGEST_TRACE_S: f64 = 60.0;
+/// Refuses what somebody does by hand to a stand that nobody is at, and what belongs to a loop that is not closed. Not by
+/// clap's `requires`, which says no reason, and nothing at all beside an option that the required one excludes.
+fn by_hand(arguments: &Arguments) -> Result<()> {
+    let by_hand = [
+        ("--pose", arguments.pose.is_some()),
+        ("--belt", arguments.belt != 0.0),
+        ("--stop", !arguments.stop.is_empty()),
+    ];
+    if let Some((option, _)) = by_hand.iter().find(|(_, is_given)| *is_given) {
+        misused!(
+            help = "serve the board, and record it from another terminal: `imu-stand run --pty --belt 0.004 --stop 20,25`, then \
+                    `imu-stand capture --port PORT --duty 120 --out capture.csv` with the PORT that it prints",
+            "{option} goes with --pty: without it nobody is at the stand, and what is hidden has a course of its own"
+        );
+    }
+    let of_loop = [
+        ("--correct-by", arguments.correct_by.is_some()),
+        ("--longest", arguments.longest.is_some()),
+    ];
+    if let Some((option, _)) = of_loop
+        .iter()
+        .find(|(_, is_given)| *is_given && !arguments.correct)
+    {
+        misused!(
+            help = "add `--correct`, without --analysis, --report and --details, which are of one record",
+            "{option} goes with --correct, which closes the loop"
+        );
+    }
+    Ok(())
+}
 
 /// Whether a run of so many seconds can be answered.
 fn length(seconds: f64) -> Result<()> {
@@ -165,34 +191,6 @@ fn longest(text: &str) -> std::result::Result<f64, String> {
     seconds.ok_or_else(|| format!("takes a length within {SHORTEST_S} .. {LONGEST_S} s"))
 }
 
-/// How long the stop is held, from and to, s.
-#[derive(Clone, Copy, Debug)]
-struct Held([f64; 2]);
-
-fn held(text: &str) -> std::result::Result<Held, String> {
-    match two_times(text) {
-        Some((from, to)) if from >= 0.0 && from < to => Ok(Held([from, to])),
-        _ => Err("takes two times of which the second is later: 20,25".to_owned()),
-    }
-}
-
-fn two_times(text: &str) -> Option<(f64, f64)> {
-    let (from, to) = text.split_once(',')?;
-    Some((from.trim().parse().ok()?, to.trim().parse().ok()?))
-}
-
-/// `0,2`.
-fn span(text: &str) -> std::result::Result<Span, String> {
-    match two_times(text) {
-        Some((from, to)) if from >= 0.0 && from < to && to - from <= LONGEST_TRACE_S => {
-            Ok(Span(from, to))
-        }
-        _ => Err(format!(
-            "takes two times of which the second is later, {LONGEST_TRACE_S} s apart at the most: 0,2"
-        )),
-    }
-}
-
 /// Where `cargo xtask image` puts it.
 pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
@@ -218,6 +216,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         #[cfg(not(unix))]
         miette::bail!("this system has no pseudo-terminals: --pty works on Linux and macOS");
     }
+    by_hand(arguments)?;
     length(arguments.seconds)?;
     if arguments.out.as_os_str() == outputs::DASH {
         misused!(

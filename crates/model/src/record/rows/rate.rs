@@ -133,13 +133,13 @@ pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
     };
     if let Some(stated) = stated {
         if (stated / rate - 1.0).abs() > SIDE {
-            let told = format!(
-                "the stated rate is {stated:.4} Hz, but by the times of the rows it is {rate:.4} Hz: all times and frequencies \
-                 follow the stated one"
-            );
-            if !record.notes.contains(&told) {
-                record.to_mut().notes.push(told);
-            }
+            let record = record.to_mut();
+            record.header.rate_hz = Some(rate);
+            let entries = record.header.entries.iter_mut();
+            (entries.filter(|(key, _)| key == "rate_hz")).for_each(|e| e.1 = rate.to_string());
+            record.notes.push(format!(
+                "the stated rate is {stated:.4} Hz, but by the times of the rows it is {rate:.4} Hz: the times are taken"
+            ));
         }
         return;
     }

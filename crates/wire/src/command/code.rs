@@ -1,0 +1,29 @@
+//! The codes of the commands on the wire.
+
+pub const PING: u8 = 1;
+pub const GET_HELLO: u8 = 2;
+pub const KEEP_ALIVE: u8 = 3;
+pub const COUNTERS: u8 = 4;
+pub const CLEAR_COUNTERS: u8 = 5;
+pub const REBOOT: u8 = 6;
+pub const SET_RATE: u8 = 16;
+pub const SET_BAUD: u8 = 17;
+pub const SET_GYRO: u8 = 18;
+pub const SET_ACC_RANGE: u8 = 19;
+pub const BIAS_NULL: u8 = 32;
+pub const SET_BIAS: u8 = 33;
+pub const SET_SCALE: u8 = 34;
+pub const SET_CORRECTION: u8 = 35;
+pub const CORRECTION: u8 = 36;
+pub const GET_CORRECTION: u8 = 37;
+pub const MOTOR_DUTY: u8 = 48;
+pub const MOTOR_PROFILE: u8 = 49;
+pub const MOTOR_LIMITS: u8 = 50;
+pub const ARM: u8 = 51;
+pub const READ_REGISTER: u8 = 64;
+pub const WRITE_REGISTER: u8 = 65;
+pub const SELF_TEST: u8 = 66;
+pub const STORE_CONFIG: u8 = 80;
+pub const LOAD_CONFIG: u8 = 81;
+pub const DEFAULT_CONFIG: u8 = 82;
+pub const SET_BOARD_ID: u8 = 83;
