@@ -259,7 +259,7 @@ pub enum VarianceLaw {
     /// 1 + coefficient x the shape.
     Shape {
         /// One value per sample, 0..1.
-        shape: Vec<f64>,
+        shape: Arc<Vec<f64>>,
         /// Parameters that say which of the effect's shapes it is.
         fixed: Vec<(&'static str, f64, &'static str)>,
         /// The channel that it is made of.

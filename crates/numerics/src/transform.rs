@@ -368,9 +368,7 @@ impl Dct {
     /// Columns of several that may explain the data, those of a long record in short numbers.
     pub fn columns<X: AsRef<[f64]>>(&self, all: impl IntoIterator<Item = X>) -> Vec<Column> {
         if self.n > LONG {
-            self.short(all)
-                .map(|c| Column::Short(Arc::new(c)))
-                .collect()
+            self.short(all).map(Column::short).collect()
         } else {
             let whole = self.forward_all(all);
             whole.map(|c| Column::Whole(Arc::new(c))).collect()

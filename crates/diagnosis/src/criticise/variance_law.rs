@@ -134,7 +134,7 @@ fn offer(
         VarianceLaw::Shape { shape, .. } => {
             let (lr, gamma, error) = scan::variance_law(e, shape);
             found.coefficients = vec![(gamma, error)];
-            (lr, threshold::variance_law(), shape.clone())
+            (lr, threshold::variance_law(), shape.to_vec())
         }
         VarianceLaw::Segment => {
             let (lr, start, end, increase) = scan::segment(e);
@@ -214,10 +214,10 @@ fn settle_one(s: &Searched<'_>, v: &mut VarianceFound, e: &[f64]) -> Vec<Vec<f64
     let ((_, increase, error), _, shape) = &laws[taken];
     v.found.coefficients = vec![(*increase, *error)];
     v.found.fixed = fixed;
-    v.shape.clone_from(shape);
+    v.shape = shape.to_vec();
     v.parameters = v.effect.describe(&v.found);
     let others = near.into_iter().filter(|i| *i != taken);
-    others.map(|i| laws[i].2.clone()).collect()
+    others.map(|i| laws[i].2.to_vec()).collect()
 }
 
 /// What the laws of the variance that were found on a channel claim, each claim with its chance.

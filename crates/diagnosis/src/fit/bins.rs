@@ -35,9 +35,9 @@ pub struct Bins {
     /// Random-walk shape 1 / (2 - 2 cos w).
     walk: Vec<f64>,
     /// Frequencies and random-walk shape at every coefficient, that of k = 0 in the place of which k = 1 stands, each once
-    /// it is asked for.
-    fine: OnceLock<Frequencies>,
-    walks: OnceLock<Vec<f64>>,
+    /// it is asked for, and the same for all bins of a length.
+    fine: Arc<OnceLock<Frequencies>>,
+    walks: Arc<OnceLock<Vec<f64>>>,
 }
 
 fn walk_shape(omega: f64) -> f64 {
@@ -92,8 +92,17 @@ impl Bins {
             counts,
             at,
             walk,
-            fine: OnceLock::new(),
-            walks: OnceLock::new(),
+            fine: Arc::default(),
+            walks: Arc::default(),
+        }
+    }
+
+    /// As [`Bins::about`], of the length of these.
+    pub(crate) fn finer_about(&self, peaks: &[Peak]) -> Self {
+        Self {
+            fine: Arc::clone(&self.fine),
+            walks: Arc::clone(&self.walks),
+            ..Self::about(self.n, peaks)
         }
     }
 

@@ -22,7 +22,7 @@ pub use numerics::transform::Dct;
 
 /// Two numbers of the samples' bits and places: columns that agree in both are the same. Products of two words, their halves
 /// laid on each other.
-fn digest(x: &[f64]) -> [u64; 2] {
+pub(crate) fn digest(x: &[f64]) -> [u64; 2] {
     const BY: [u64; 4] = [
         0x9e37_79b9_7f4a_7c15,
         0xc2b2_ae3d_27d4_eb4f,

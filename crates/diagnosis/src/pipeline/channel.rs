@@ -8,7 +8,7 @@ use crate::criticise::variance_law::Untold;
 use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
 use crate::fit::channel::{State, VarianceLaws, whitened};
 use crate::fit::estimate;
-use crate::fit::likelihood::{Bins, Noise, Panel};
+use crate::fit::likelihood::{Noise, Panel};
 use crate::ingest::types::{Grid, Target};
 use crate::joint;
 use crate::report::detection_limits;
@@ -30,7 +30,7 @@ fn laid_out<'a>(grid: &'a Grid, target: &'a Target) -> Search<'a> {
     let coefficients = &target.coefficients;
     let bins = match bands::peaks(coefficients, &target.noise, target.white, &grid.bins) {
         none if none.is_empty() => Arc::clone(&grid.bins),
-        peaks => Arc::new(Bins::about(grid.n, &peaks)),
+        peaks => Arc::new(grid.bins.finer_about(&peaks)),
     };
     let panel = Panel::of(&grid.dct, &bins, Arc::clone(coefficients));
     let view = View {

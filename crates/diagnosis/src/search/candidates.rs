@@ -8,7 +8,7 @@ use model::record::Quantity;
 
 use crate::features::{self, echo};
 use crate::fit::channel::{self, RIVAL_SPAN};
-use crate::fit::likelihood::Panel;
+use crate::fit::likelihood::{Panel, digest};
 use crate::test_level::worded;
 
 /// A hypothesis under test.
@@ -154,6 +154,12 @@ fn of_library(panel: &Panel, view: &View<'_>, bursts: bool) -> (Vec<Candidate>, 
                     let columns = r.columns.iter_mut();
                     let values = columns.map(|c| std::mem::take(&mut c.values));
                     panel.add_candidate(&values.collect::<Vec<_>>(), common)
+                }
+                // The channels of a record are asked for the same ones.
+                Hypothesis::Variance(VarianceLaw::Shape { shape, .. }) => {
+                    let own = std::mem::take(shape);
+                    *shape = panel.dct.known.same(digest(&own), own);
+                    vec![]
                 }
                 _ => vec![],
             };

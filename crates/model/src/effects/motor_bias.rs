@@ -129,7 +129,7 @@ impl Effect for MotorBias {
             );
         }
         let surge = Hypothesis::Shaped(Arc::new(Surge {
-            duty: duty.clone(),
+            command: Arc::clone(&signal.values),
             rate_hz: view.rate_hz,
             delay: 0.0,
         }));
@@ -181,7 +181,7 @@ impl Effect for MotorBias {
         let tau = of("surge_time") * simulation.rate_hz;
         if tau > 0.0 {
             let (surge, start) = (of("surge_at_full_duty"), of("surge_at_start"));
-            let each = lagging(duty, tau)
+            let each = lagging(duty.iter().copied(), tau)
                 .into_iter()
                 .zip(settling(duty.len(), tau));
             for (shift, (ahead, left)) in shift.iter_mut().zip(each) {
@@ -223,17 +223,17 @@ const MOST_ALIKE: f64 = 0.97;
 
 /// What the command is ahead of a speed that follows it with a time constant of `tau` samples, averaged over each
 /// sample. The command is held from sample to sample, and the motor has its speed at the start.
-fn lagging(duty: &[f64], tau: f64) -> Vec<f64> {
+fn lagging(duty: impl Iterator<Item = f64>, tau: f64) -> Vec<f64> {
     let keep = (-1.0 / tau).exp();
     let mean = tau * (1.0 - keep);
-    let mut speed = duty.first().copied().unwrap_or(0.0);
-    duty.iter()
-        .map(|d| {
-            let ahead = d - speed;
-            speed = d - keep * ahead;
-            mean * ahead
-        })
-        .collect()
+    let mut duty = duty.peekable();
+    let mut speed = duty.peek().copied().unwrap_or(0.0);
+    duty.map(|d| {
+        let ahead = d - speed;
+        speed = d - keep * ahead;
+        mean * ahead
+    })
+    .collect()
 }
 
 /// What is left of a surge of 1 at the first sample's beginning, averaged over each sample.
@@ -263,9 +263,16 @@ const LATEST: f64 = 2.0;
 /// The surge, by its time, so many samples late.
 #[derive(Clone)]
 struct Surge {
-    duty: Vec<f64>,
+    /// The motor command, as it was recorded.
+    command: Arc<Vec<f64>>,
     rate_hz: f64,
     delay: f64,
+}
+
+impl Surge {
+    fn duty(&self) -> impl Iterator<Item = f64> {
+        self.command.iter().map(|v| v / FULL_DUTY)
+    }
 }
 
 impl Shape for Surge {
@@ -287,13 +294,13 @@ impl Shape for Surge {
         let tau = at * self.rate_hz;
         let mut all = vec![Column {
             parameter: "surge_at_full_duty",
-            values: late(lagging(&self.duty, tau), self.delay),
+            values: late(lagging(self.duty(), tau), self.delay),
         }];
         // A motor that is driven from the first sample on may have been switched on just before.
-        if self.duty.first().is_some_and(|d| *d != 0.0) {
+        if self.command.first().is_some_and(|v| *v != 0.0) {
             all.push(Column {
                 parameter: "surge_at_start",
-                values: late(settling(self.duty.len(), tau), self.delay),
+                values: late(settling(self.command.len(), tau), self.delay),
             });
         }
         all
@@ -316,11 +323,11 @@ impl Shape for Surge {
 
     fn beside(&self, parameter: &str, fixed: &[(&str, f64, &str)]) -> Option<Vec<f64>> {
         let by_size = fixed.iter().any(|f| f.0 == "by_magnitude" && f.1 != 0.0);
-        let each = self.duty.iter();
+        let each = self.duty();
         let values = match parameter {
-            "at_full_duty" if by_size => each.map(|d| d.abs()).collect(),
-            "at_full_duty" => each.copied().collect(),
-            "while_turning" => each.map(|d| direction(*d)).collect(),
+            "at_full_duty" if by_size => each.map(f64::abs).collect(),
+            "at_full_duty" => each.collect(),
+            "while_turning" => each.map(direction).collect(),
             _ => return None,
         };
         Some(late(values, self.delay))

@@ -1,5 +1,7 @@
 //! The motor makes the rate noisier.
 
+use std::sync::Arc;
+
 use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage,
     VarianceLaw, View, optional, parameter, value,
@@ -90,7 +92,7 @@ impl Effect for MotorNoise {
         let law = |shape, by_magnitude| {
             let fixed = vec![("by_magnitude", by_magnitude, "1")];
             Hypothesis::Variance(VarianceLaw::Shape {
-                shape,
+                shape: Arc::new(shape),
                 fixed,
                 follows: signal.name.clone(),
             })

@@ -21,6 +21,8 @@ struct Kept {
     named: HashMap<String, Vec<Column>>,
     /// Sums of products of the columns, by their places in memory, where they stay while they are kept.
     products: HashMap<[usize; 2], Arc<Vec<f64>>>,
+    /// Samples that each channel makes for itself, by their digest.
+    samples: HashMap<[u64; 2], Arc<Vec<f64>>>,
     places: HashSet<usize>,
 }
 
@@ -63,6 +65,11 @@ impl Known {
             let mut kept = self.kept();
             kept.named.insert(name.to_owned(), columns.to_vec());
         }
+    }
+
+    /// These samples, or the same of another channel, in the place of which they are let go of.
+    pub fn same(&self, key: [u64; 2], samples: Arc<Vec<f64>>) -> Arc<Vec<f64>> {
+        Arc::clone(self.kept().samples.entry(key).or_insert(samples))
     }
 
     /// Sums of products of two columns, where they are known.
