@@ -263,3 +263,64 @@ pub fn drawn(steps: &[Step], law: &Law, mut normal: impl FnMut() -> f64) -> Vec<
     let all = back(steps, law, |told| told.drawn([normal(), normal()]));
     all.into_iter().map(|(phase, _)| phase).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    const BLOCKS: usize = 4000;
+    const VARIANCE: f64 = 0.5;
+
+    /// Mean square of what readings of these ratios leave in doubt of a phase, in truth and as they say.
+    fn off(ratios: &[f64]) -> (f64, f64) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let law = Law::new(1.0, 0.05, 30.0, 0.0);
+        let (mut pitch, mut turned) = (0.0, 0.0);
+        let mut phase = vec![];
+        for _ in 0..BLOCKS {
+            let next = law.keep * pitch + 0.05 * (1.0 - law.keep * law.keep).sqrt() * normal();
+            turned += 0.5 * (pitch + next);
+            pitch = next;
+            phase.push(turned);
+        }
+        let each = ratios.iter().map(|ratio| {
+            let noisy = phase.iter().map(|p| {
+                let (sin, cos) = (ratio * p).sin_cos();
+                [cos, sin].map(|v| v + VARIANCE.sqrt() * normal())
+            });
+            noisy.collect::<Vec<[f64; 2]>>()
+        });
+        let blocks: Vec<Vec<[f64; 2]>> = each.collect();
+        let readings = ratios.iter().zip(&blocks).map(|(ratio, blocks)| Reading {
+            ratio: *ratio,
+            variance: VARIANCE,
+            blocks,
+        });
+        let mut steps = vec![];
+        follow(&readings.collect::<Vec<_>>(), &law, |s| steps.push(*s));
+        let told = smoothed(&steps, &law);
+        let apart = told
+            .iter()
+            .zip(&phase)
+            .map(|((p, _), truth)| (p - truth).powi(2));
+        let count = BLOCKS as f64;
+        let said = told.iter().map(|(_, v)| v);
+        (apart.sum::<f64>() / count, said.sum::<f64>() / count)
+    }
+
+    #[test]
+    fn more_readings_tell_a_phase_better_and_say_how_well() {
+        let cases: [&[f64]; 4] = [&[1.0], &[1.0, 1.0], &[1.0, 2.0], &[1.0, -2.0]];
+        let [one, two, octave, folded] = cases.map(off);
+        for (truth, said) in [one, two, octave, folded] {
+            // A mean of 4000 squares, some twelve of which are told by one another.
+            assert!((truth / said - 1.0).abs() < 0.3, "{truth} {said}");
+        }
+        assert!(two.0 < one.0 && octave.0 < two.0 && folded.0 < two.0);
+    }
+}

@@ -353,4 +353,44 @@ mod tests {
         let single = vec![turn(&both, 50.0)];
         assert_eq!(repeated(single.clone()), single);
     }
+
+    #[test]
+    fn tones_of_one_rotor_are_one_finding_and_stay_several_in_the_model() {
+        let tone = |channels: &[&str], pitch: f64, amplitude: f64, time: f64| {
+            let exact = |v: f64, unit: &str| Parameter::exact(v, unit);
+            let parameters = Parameters::from([
+                ("amplitude".into(), exact(amplitude, "deg/s")),
+                ("center_frequency".into(), exact(pitch, "Hz")),
+                (wandering_line::PITCH_TIME.into(), exact(time, "s")),
+            ]);
+            let each = channels.iter().map(|c| ((*c).into(), parameters.clone()));
+            let several = channels.len() > 1;
+            Finding {
+                cause: wandering_line::ID.into(),
+                channels: channels.iter().map(|c| (*c).into()).collect(),
+                per_channel: each.filter(|_| several).collect(),
+                parameters,
+                ..Finding::default()
+            }
+        };
+        let all = vec![
+            tone(&["gyro_x"], 5.0, 0.1, 7.0),
+            tone(&["gyro_x", "gyro_y"], 10.0, 0.3, 7.0),
+            tone(&["gyro_z"], 5.0, 0.2, 8.0),
+        ];
+        let told = rotors(all.clone());
+        assert_eq!(told.len(), 2, "{told:#?}");
+        let rotor = &told[0];
+        assert_eq!(rotor.parameters["center_frequency"].value, 10.0);
+        assert_eq!(rotor.channels, ["gyro_x", "gyro_y"]);
+        assert_eq!(rotor.harmonics.len(), 1);
+        assert_eq!(rotor.harmonics[0]["gyro_x"]["center_frequency"].value, 5.0);
+        let of = |all: &[Finding]| {
+            let all: Vec<&Finding> = all.iter().collect();
+            let mut effects = crate::report::handover::effects_of(&all);
+            effects.sort_by_key(|e| format!("{e:?}"));
+            effects
+        };
+        assert_eq!(of(&told), of(&all));
+    }
 }

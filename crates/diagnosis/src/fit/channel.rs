@@ -123,11 +123,16 @@ impl Term {
         }
     }
 
-    /// Whether it and another one are tones of one rotor: their pitches stay for one time.
+    /// Whether it is a tone that several channels have a part of.
+    pub(crate) fn is_shared_tone(&self) -> bool {
+        self.path.as_ref().is_some_and(|p| p.shared)
+    }
+
+    /// Whether it and another one are tones of one rotor that shakes several channels: their pitches stay for one time. What one channel
+    /// alone has need be no rotor.
     pub(crate) fn turns_with(&self, other: &Self) -> bool {
         let stays = |t: &Self| Some(t.stated.as_ref()?.last()?.0);
-        let tracked = self.path.is_some() && other.path.is_some();
-        tracked && stays(self) == stays(other)
+        self.is_shared_tone() && other.is_shared_tone() && stays(self) == stays(other)
     }
 
     /// Likelihood ratio beyond the threshold.

@@ -299,7 +299,7 @@ impl Search<'_> {
                 .is_some_and(|own| band_source::is_read(own, self.view.signals, &felt));
             let is_harmonic = is_read
                 && (moves[number].as_ref()).is_some_and(|own| band_alone::is_locked(own, &others));
-            let harmonics = moves[number].as_ref().filter(|_| !tracked);
+            let harmonics = moves[number].as_ref().filter(|_| !own.is_shared_tone());
             let harmonics = harmonics.map_or(vec![], |own| self.harmonics(state, &cluster, own));
             for (place, i) in cluster.iter().enumerate() {
                 let t = &mut state.terms[*i];

@@ -115,6 +115,7 @@ impl Attempt {
             omega: self.middle,
             length: self.length,
             phase: self.seen.phase.clone(),
+            shared: false,
         }
     }
 

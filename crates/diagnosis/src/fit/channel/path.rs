@@ -13,6 +13,8 @@ pub struct Path {
     pub length: f64,
     /// Phase of each block beside that, rad, and its variance.
     pub phase: Vec<(f64, f64)>,
+    /// Whether several channels have a part of the tone, as of what shakes a stand.
+    pub shared: bool,
 }
 
 impl Path {

@@ -93,6 +93,7 @@ impl Lead {
             phase: phases
                 .map(|(p, v)| (sign * ratio * p, ratio * ratio * v))
                 .collect(),
+            shared: self.path.shared,
         };
         Self {
             path: Arc::new(path),
@@ -145,14 +146,16 @@ impl Rotor {
     }
 }
 
-/// What a channel reads; of one under test, its number.
+/// What a channel reads, its number among all, and of one under test that among these.
 struct Heard {
+    number: usize,
     coefficients: Arc<Vec<f64>>,
     target: Option<usize>,
 }
 
 /// A multiple as a channel has it: its blocks, turned to the multiple of the phase, and the variance of the noise in either part.
 struct Part {
+    heard: usize,
     target: Option<usize>,
     ratio: f64,
     sign: f64,
@@ -192,6 +195,7 @@ fn part(heard: &Heard, ratio: f64, lead: &Lead, count: usize) -> Option<Part> {
         known += size * size;
     }
     Some(Part {
+        heard: heard.number,
         target: heard.target,
         ratio,
         sign,
@@ -274,6 +278,8 @@ fn rotor(all: &[Heard], seed: &(Lead, Outcome, f64)) -> Option<Rotor> {
         }
         lead = followed(&readings, &lead, n as f64 / count as f64)?;
     }
+    let shared = found.iter().any(|p| p.heard != found[0].heard);
+    Arc::make_mut(&mut lead.path).shared = shared;
     let parts = found.iter().filter_map(|p| Some((p.target?, p.ratio)));
     let rotor = Rotor {
         lead,
@@ -344,13 +350,16 @@ pub(crate) fn rotors(grid: &Grid, searched: &[Searched<'_>]) -> Vec<Rotor> {
         return vec![];
     }
     let gyros = searched.iter().enumerate().map(|(k, s)| Heard {
+        number: k,
         coefficients: Arc::clone(&s.target.coefficients),
         target: Some(k),
     });
     let beside = grid.signals.iter();
     let accelerometers = beside
         .filter(|s| s.quantity == Quantity::Acc)
-        .map(|s| Heard {
+        .enumerate()
+        .map(|(k, s)| Heard {
+            number: searched.len() + k,
             coefficients: Arc::new(grid.dct.forward(&s.values)),
             target: None,
         });
