@@ -120,7 +120,10 @@ fn slope(lines: &[(Vec<f64>, Vec<f64>)]) -> Option<f64> {
     (under > 0.0).then(|| over / under)
 }
 
-/// Takes the rate of a record whose header has none from the times of its rows; tells where they contradict the header.
+/// Steps of a clock that starts anew now and then to one that goes back, at least; a column that is no time goes back at every other.
+const LEAST_FORWARD: usize = 20;
+
+/// Takes the rate of a record from the times of its rows where its header has none or they contradict it, which is told.
 pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
     let stated = record.header.rate_hz;
     let stated = stated.filter(|r| r.is_finite() && *r > 0.0);
@@ -131,8 +134,11 @@ pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
     let Some(rate) = by_times(record) else {
         return;
     };
+    let t = record.host_time_s.as_deref().unwrap_or_default();
+    let steps = t.len().saturating_sub(1);
     if let Some(stated) = stated {
-        if (stated / rate - 1.0).abs() > SIDE {
+        let back = t.windows(2).filter(|w| w[1] < w[0]).count();
+        if (stated / rate - 1.0).abs() > SIDE && back * LEAST_FORWARD <= steps {
             let record = record.to_mut();
             record.header.rate_hz = Some(rate);
             let entries = record.header.entries.iter_mut();
@@ -143,8 +149,6 @@ pub(super) fn take_from_times(record: &mut Cow<'_, Record>) {
         }
         return;
     }
-    let t = record.host_time_s.as_deref().unwrap_or_default();
-    let steps = t.len().saturating_sub(1);
     let same = t.windows(2).filter(|w| w[0] == w[1]).count();
     let record = record.to_mut();
     record.header.rate_hz = Some(rate);
