@@ -185,7 +185,7 @@ fn blocks(values: &[f64], count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The figures of the terms of a channel: one for each, and one for those of an effect that follow the same channel.
+/// The figures of the terms of a channel: one for each, and one for those of an effect that follow the same channel, or of a rotor.
 pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
     // A band is shown once, with all that it is made of.
     let named = |t: &&Term| t.effect.id() != crate::fit::channel::ID && !t.is_part();
@@ -197,8 +197,8 @@ pub(crate) fn of_channel(s: &Searched<'_>, grid: &Grid) -> Vec<Evidence> {
             .find(|g| t.follows.as_ref() == Some(*g))
     };
     let together = |a: &Term, b: &Term| {
-        let same = a.effect.id() == b.effect.id() && over(a) == over(b);
-        std::ptr::eq(a, b) || same && over(a).is_some() && is_course(a) && is_course(b)
+        let same = a.effect.id() == b.effect.id() && over(a) == over(b) && over(a).is_some();
+        std::ptr::eq(a, b) || a.turns_with(b) || same && is_course(a) && is_course(b)
     };
     let mut all = without_a_name::all(s, grid);
     for (i, term) in named.iter().enumerate() {

@@ -244,11 +244,10 @@ fn blocks_for(lead: &Lead, widest: f64, n: usize) -> usize {
     held.clamp(LEAST_BLOCKS, apart.max(LEAST_BLOCKS))
 }
 
-/// The rotor that is heard about a tone of one channel; none where it is a line, or a noise
-/// of one channel.
-fn rotor(all: &[Heard], seed: &(Lead, Outcome, f64)) -> Option<Rotor> {
+/// The rotor that is heard about a tone of one channel; none where it is a line, or a noise of one channel.
+fn rotor(all: &[Heard], seed: Seed) -> Option<Rotor> {
     let n = all.first()?.coefficients.len();
-    let (mut lead, mut found) = (seed.0.clone(), vec![]);
+    let (mut lead, mut found) = (seed.lead, vec![]);
     for round in 0..ROUNDS {
         let widest = (found.iter()).map(|p: &Part| p.ratio).fold(1.0, f64::max);
         let count = blocks_for(&lead, widest, n);
@@ -283,10 +282,10 @@ fn rotor(all: &[Heard], seed: &(Lead, Outcome, f64)) -> Option<Rotor> {
     let parts = found.iter().filter_map(|p| Some((p.target?, p.ratio)));
     let rotor = Rotor {
         lead,
-        claim: seed.1.clone(),
+        claim: seed.claim,
         parts: parts.collect(),
     };
-    let is_course = seed.2 > FORGOTTEN.ln();
+    let is_course = seed.log_time > FORGOTTEN.ln();
     let is_line = rotor.lead.stated[2].0 < NARROWEST * PI / n as f64;
     (!is_line && (is_course || found.len() > 1)).then_some(rotor)
 }
@@ -310,9 +309,15 @@ fn followed(readings: &[(f64, f64, Vec<[f64; 2]>)], before: &Lead, length: f64) 
     (lead.path.doubt() < LARGEST_DOUBT).then_some(lead)
 }
 
-/// The tone that a peak of a channel's spectrum is, where its phase can be told, with what its pitch claims, and the logarithm of its
-/// correlation time, blocks.
-fn seed(heard: &Heard, peak: &Peak) -> Option<(Lead, Outcome, f64)> {
+/// A tone that one channel tells by itself, what its pitch claims, and the logarithm of its correlation time, blocks.
+struct Seed {
+    lead: Lead,
+    claim: Outcome,
+    log_time: f64,
+}
+
+/// The tone that a peak of a channel's spectrum is, where its phase can be told.
+fn seed(heard: &Heard, peak: &Peak) -> Option<Seed> {
     let coefficients = &heard.coefficients;
     let n = coefficients.len();
     let spacing = PI / n as f64;
@@ -325,7 +330,11 @@ fn seed(heard: &Heard, peak: &Peak) -> Option<(Lead, Outcome, f64)> {
         Attempt::over(coefficients, (from, to), density)
     };
     let (best, claim) = widest(over)?;
-    Some((Lead::of(&best), claim, best.seen.at[2]))
+    Some(Seed {
+        lead: Lead::of(&best),
+        claim,
+        log_time: best.seen.at[2],
+    })
 }
 
 impl State {
@@ -406,7 +415,7 @@ pub(crate) fn rotors(grid: &Grid, searched: &[Searched<'_>]) -> Vec<Rotor> {
             break;
         }
         tries += 1;
-        found.extend(seed(heard, &peak).and_then(|seed| rotor(&all, &seed)));
+        found.extend(seed(heard, &peak).and_then(|seed| rotor(&all, seed)));
     }
     found.retain(|r| !r.parts.is_empty());
     found
