@@ -289,8 +289,10 @@ pub(crate) fn complete(mut findings: Vec<Finding>) -> Vec<Finding> {
 #[cfg(test)]
 mod tests {
     use model::effects::base_motion;
+    use model::file::EffectModel;
 
     use super::*;
+    use crate::report::handover::effects_of;
 
     fn turn(channels: &[(&str, f64)], from: f64) -> Finding {
         let by = |peak: f64| {
@@ -318,6 +320,14 @@ mod tests {
         }
     }
 
+    /// The effects that findings are in the model, in some order.
+    fn in_model(all: &[Finding]) -> Vec<EffectModel> {
+        let all: Vec<&Finding> = all.iter().collect();
+        let mut effects = effects_of(&all);
+        effects.sort_by_key(|e| format!("{e:?}"));
+        effects
+    }
+
     #[test]
     fn turns_at_several_times_are_one_entry_and_stay_several_in_the_model() {
         let sway = Finding {
@@ -343,13 +353,7 @@ mod tests {
         assert_eq!(one.per_channel["gyro_x"]["peak"].value, 3.0);
         assert_eq!(one.parameters["count"].value, 3.0);
         // Each turn acts on each axis that felt it, as it does where each is told apart.
-        let of = |all: &[Finding]| {
-            let all: Vec<&Finding> = all.iter().collect();
-            let mut effects = crate::report::handover::effects_of(&all);
-            effects.sort_by_key(|e| format!("{e:?}"));
-            effects
-        };
-        assert_eq!(of(&told), of(&turns));
+        assert_eq!(in_model(&told), in_model(&turns));
         let single = vec![turn(&both, 50.0)];
         assert_eq!(repeated(single.clone()), single);
     }
@@ -385,12 +389,6 @@ mod tests {
         assert_eq!(rotor.channels, ["gyro_x", "gyro_y"]);
         assert_eq!(rotor.harmonics.len(), 1);
         assert_eq!(rotor.harmonics[0]["gyro_x"]["center_frequency"].value, 5.0);
-        let of = |all: &[Finding]| {
-            let all: Vec<&Finding> = all.iter().collect();
-            let mut effects = crate::report::handover::effects_of(&all);
-            effects.sort_by_key(|e| format!("{e:?}"));
-            effects
-        };
-        assert_eq!(of(&told), of(&all));
+        assert_eq!(in_model(&told), in_model(&all));
     }
 }

@@ -31,8 +31,6 @@ use numerics::tails;
 use phase::{Tracked, tracked};
 pub(crate) use rotor::{Rotor, rotors};
 
-/// Most tones that are tracked on one channel: a hum or a rotor, and harmonics of it.
-const MOST_TONES: usize = 5;
 /// Half widths of a peak, either side, that its tone is sought in: a normal law of that half width at half power ends at 3.5 of its
 /// standard deviations.
 const REACH: f64 = 3.0;
@@ -68,7 +66,7 @@ struct Place {
 struct TrackedTone {
     term: Term,
     course: Vec<f64>,
-    /// Nats that its phase, which follows noise as well, takes of that.
+    /// Nats that its phase gains where it follows the noise of the channel.
     by_itself: f64,
     /// Tones of the rotor that it is one of.
     among: usize,
@@ -209,7 +207,8 @@ impl Place {
 }
 
 impl Search<'_> {
-    /// The state in which the parts of `rotors` stand for the lines and bands that were laid on them; `target` is the number of the channel, and `again` searches the data as they are.
+    /// The state in which the parts of `rotors` stand for the lines and bands that were laid on them; `target` is the number of the
+    /// channel, and `again` searches the data as they are.
     #[must_use]
     pub(crate) fn beside_tracked_tones(
         &self,

@@ -39,8 +39,8 @@ impl Search<'_> {
         let to = ((place.to * to_k) as usize).min(n);
         let others = without_others(self, state, &place.terms);
         let density = self.density_about(state, &place.wider(f64::from(1 << MOST_DOUBLED), all));
-        let mut led = of.lead.times(ratio);
-        let path = Arc::make_mut(&mut led.path);
+        let mut tone = of.lead.times(ratio);
+        let path = Arc::make_mut(&mut tone.path);
         let columns = path.quadratures(n).map(|c| self.panel.dct.forward(&c));
         let [own, across] = [0, 1].map(|k| &columns[k][from..to]);
         let (p, q, r) = (dot(own, own), dot(own, across), dot(across, across));
@@ -55,16 +55,16 @@ impl Search<'_> {
         path.amplitude = a.hypot(b);
         let ahead = -b.atan2(a);
         path.phase.iter_mut().for_each(|(phase, _)| *phase += ahead);
-        led.stated[0] = (path.amplitude, (density / (0.5 * (p + r))).sqrt());
+        tone.stated[0] = (path.amplitude, (density / (0.5 * (p + r))).sqrt());
         let course = path.course(n);
-        let mut term = self.described(led.stated, &led.path, density, nats)?;
+        let mut term = self.described(tone.stated, &tone.path, density, nats)?;
         // Where it is, the rotor tells: it is not the best of all places.
         term.threshold = term.threshold.min(2.0 * LEAST_PART);
         term.claims.push(of.claim.clone());
         Some(TrackedTone {
             term,
             course,
-            by_itself: 0.25 * n as f64 * led.path.doubt() * led.path.amplitude.powi(2) / density,
+            by_itself: 0.25 * n as f64 * tone.path.doubt() * tone.path.amplitude.powi(2) / density,
             among: of.tones(),
             from: place.from,
             to: place.to,

@@ -5,7 +5,7 @@
 //! 1075), each by its size over its noise, and the multiples are so many readings of one phase ([`model::tone`]). What accelerometers
 //! read of it tells as much, though none of it is asked of them.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use model::effect::Peak;
@@ -14,7 +14,7 @@ use model::tone::Reading;
 use rustfft::num_complex::Complex;
 
 use super::phase::{Coordinates, FORGOTTEN, Tracked, likeliest};
-use super::{Attempt, LARGEST_DOUBT, LEAST_BLOCKS, LEAST_REACH, MOST_TONES, REACH, Stated};
+use super::{Attempt, LARGEST_DOUBT, LEAST_BLOCKS, LEAST_REACH, REACH, Stated};
 use super::{all_about, density, places, turned_back, widest};
 use crate::fit::channel::{Form, Path, State, Term};
 use crate::fit::likelihood::Noise;
@@ -39,13 +39,14 @@ const RATIOS: [(u32, u32); 9] = [
 pub(super) const LEAST_PART: f64 = 12.0;
 /// Most peaks of all channels whose phase is looked for.
 const MOST_TRIES: usize = 12;
+/// Most rotors of a record.
+const MOST_ROTORS: usize = 5;
 /// How often sizes are told by the phase, and the phase by them.
 const ROUNDS: usize = 3;
 /// Half widths of the widest multiple that its blocks hold, either side, over what a tone is sought in.
 const HELD: f64 = 2.0;
 /// Part of the pitch that the blocks of a multiple hold at most, either side: beyond lies the next one.
 const APART: f64 = 0.25;
-
 /// Half width of a tone, in coefficients, below which the record does not tell it from a line.
 const NARROWEST: f64 = 0.5;
 
@@ -56,7 +57,6 @@ pub(super) fn ratios() -> impl Iterator<Item = f64> {
 
 /// An angular frequency where sampling puts it, and whether it turns there as it does: 1, or -1.
 pub(super) fn folded(omega: f64) -> (f64, f64) {
-    use std::f64::consts::TAU;
     let omega = omega.rem_euclid(TAU);
     if omega > PI {
         (TAU - omega, -1.0)
@@ -218,15 +218,15 @@ fn combined(parts: &[&Part]) -> (f64, f64, Vec<[f64; 2]>) {
     (ratio, weight.recip(), blocks.collect())
 }
 
-/// Those of some multiples, each told by its ratio and where it lies, that are farther than a reach from all before them: of two that
-/// sampling puts in one place the second is not told.
-fn apart<T>(all: Vec<T>, of: impl Fn(&T) -> (f64, f64), reach: f64) -> Vec<T> {
-    let mut kept: Vec<T> = vec![];
+/// The parts that are farther than a reach from all of multiples before them: of two that sampling puts in one place the second is not
+/// told.
+fn apart(all: Vec<Part>, omega: f64, reach: f64) -> Vec<Part> {
+    let mut kept: Vec<Part> = vec![];
     for next in all {
-        let (ratio, omega) = of(&next);
-        let clear = |other: &T| {
-            let (r, o) = of(other);
-            r.total_cmp(&ratio).is_eq() || (o - omega).abs() > reach
+        let place = |p: &Part| folded(p.ratio * omega).0;
+        let clear = |other: &Part| {
+            other.ratio.total_cmp(&next.ratio).is_eq()
+                || (place(other) - place(&next)).abs() > reach
         };
         if kept.iter().all(clear) {
             kept.push(next);
@@ -260,12 +260,7 @@ fn rotor(all: &[Heard], seed: Seed) -> Option<Rotor> {
             .filter_map(|(h, r)| part(h, r, &lead, count))
             .filter(|p| p.nats > LEAST_PART)
             .collect();
-        let reach = count as f64 * PI / n as f64;
-        found = apart(
-            found,
-            |p| (p.ratio, folded(p.ratio * lead.path.omega).0),
-            reach,
-        );
+        found = apart(found, lead.path.omega, count as f64 * PI / n as f64);
         let of = |ratio: &f64| {
             let there = found.iter().filter(|p| p.ratio.total_cmp(ratio).is_eq());
             let there: Vec<&Part> = there.collect();
@@ -411,7 +406,7 @@ pub(crate) fn rotors(grid: &Grid, searched: &[Searched<'_>]) -> Vec<Rotor> {
         if found.iter().any(is_part) {
             continue;
         }
-        if found.len() == MOST_TONES || tries == MOST_TRIES {
+        if found.len() == MOST_ROTORS || tries == MOST_TRIES {
             break;
         }
         tries += 1;
