@@ -64,8 +64,19 @@ fn read(phases: &[f64], sizes: [f64; 2], noise: Noise, rng: &mut Rng) -> Vec<f64
     phases.iter().map(one).collect()
 }
 
-/// The pitch, what was drawn in words, and the record; gyros whose noise a filter holds back where `filtered`.
-fn drawn(rng: &mut Rng, filtered: bool) -> (f64, String, Record) {
+/// Beside what a rotor is drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum Beside {
+    /// White noise, three accelerometers that read it too.
+    Accelerometers,
+    /// The same, the gyros' noise held back by a filter.
+    Filter,
+    /// White noise of three gyros alone.
+    Nothing,
+}
+
+/// The pitch, what was drawn in words, and the record.
+fn drawn(rng: &mut Rng, beside: Beside) -> (f64, String, Record) {
     let rate_hz = [50.0, 100.0][between(rng, 0.0, 2.0) as usize];
     // Twice the pitch stays below half the rate.
     let pitch = rate_hz * between(rng, 0.06, 0.22);
@@ -73,10 +84,9 @@ fn drawn(rng: &mut Rng, filtered: bool) -> (f64, String, Record) {
     let time = between(rng, 3.0, 30.0);
     let phases = turned(pitch, rms, time, rate_hz, rng);
     let sizes = [between(rng, 0.4, 1.5), between(rng, 0.2, 0.6)];
-    let kept = if filtered {
-        between(rng, 0.3, 0.8)
-    } else {
-        0.0
+    let kept = match beside {
+        Beside::Filter => between(rng, 0.3, 0.8),
+        _ => 0.0,
     };
     let mut record = white::gyros(rate_hz, |_| {
         let (sigma, level) = (between(rng, 0.04, 0.12), between(rng, -1.0, 1.0));
@@ -96,8 +106,10 @@ fn drawn(rng: &mut Rng, filtered: bool) -> (f64, String, Record) {
         counts: None,
         values: read(&phases, sizes.map(|s| 2.0 * s), still, rng),
     };
-    let channels: Vec<Channel> = Axis::ALL.iter().map(accelerometer).collect();
-    record.channels.extend(channels);
+    if beside != Beside::Nothing {
+        let channels: Vec<Channel> = Axis::ALL.iter().map(accelerometer).collect();
+        record.channels.extend(channels);
+    }
     let told = format!(
         "{rate_hz} Hz, {pitch:.3} Hz, {rms:.3} Hz over {time:.1} s, {sizes:.2?}, filter {kept:.2}"
     );
@@ -105,14 +117,14 @@ fn drawn(rng: &mut Rng, filtered: bool) -> (f64, String, Record) {
 }
 
 /// Grades draws, each by whether a wandering line alone is told on all gyros, beside a filter where there is one, and held.
-fn graded(seed: u64, least: u64, filtered: bool) {
+fn graded(seed: u64, least: u64, beside: Beside) {
     let mut rng = Rng::seed_from_u64(draws::seed(seed));
     let options = DiagnoseOptions {
         replicates: 99,
         ..DiagnoseOptions::default()
     };
     let graded = draws::graded(RUNS, least, |_| {
-        let (pitch, told, record) = drawn(&mut rng, filtered);
+        let (pitch, told, record) = drawn(&mut rng, beside);
         let d = diagnose(&record, &options).expect("a diagnosis").diagnosis;
         let at_pitch = d.findings.iter().any(|f| {
             let center = f.parameters.get("center_frequency").map(|p| p.value);
@@ -121,7 +133,8 @@ fn graded(seed: u64, least: u64, filtered: bool) {
                 && center.is_some_and(|c| (c - pitch).abs() < 0.01 * pitch)
         });
         // What one pole leaves of white noise is a Gauss-Markov process.
-        let of_filter = |cause: &str| filtered && ["low_pass", "gauss_markov"].contains(&cause);
+        let of_filter =
+            |cause: &str| beside == Beside::Filter && ["low_pass", "gauss_markov"].contains(&cause);
         let is_there = |cause: &str| cause == "wandering_line" || of_filter(cause);
         // Its tones are one entry.
         let tones = |f: &&Finding| f.cause == "wandering_line";
@@ -149,10 +162,15 @@ fn graded(seed: u64, least: u64, filtered: bool) {
 
 #[test]
 fn statistical_a_rotor_is_told_on_all_axes_that_it_shakes() {
-    graded(20_261_201, LEAST, false);
+    graded(20_261_201, LEAST, Beside::Accelerometers);
 }
 
 #[test]
 fn statistical_a_rotor_is_told_beside_a_filter_of_the_noise() {
-    graded(20_261_202, LEAST, true);
+    graded(20_261_202, LEAST, Beside::Filter);
+}
+
+#[test]
+fn statistical_a_rotor_is_told_by_gyros_alone() {
+    graded(20_261_203, LEAST, Beside::Nothing);
 }

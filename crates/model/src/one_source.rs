@@ -165,6 +165,11 @@ pub(crate) struct Split {
 }
 
 impl Split {
+    /// Whether nothing of it is another's.
+    pub(crate) fn is_own(&self) -> bool {
+        self.shared.is_empty()
+    }
+
     fn new(coherence: f64, phase: f64, turning: &[[f64; 2]]) -> Self {
         let (sin, cos) = phase.sin_cos();
         let turned =

@@ -14,6 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::effects::double_rounding::Halves;
+use crate::effects::wandering_line::Turned;
 use crate::excitation::{Recorded, World, moved_like};
 use crate::file::{ChannelModel, ModelFile};
 use crate::one_source::Felt;
@@ -129,6 +130,8 @@ pub struct Simulation {
     pub rate: [Vec<f64>; 3],
     /// Oscillations of axes, where others feel them too.
     pub felt: Option<Vec<Felt>>,
+    /// Rotors of which some tone has been drawn.
+    pub rotors: Vec<Turned>,
     /// Whether the axes are those of accelerometers.
     pub of_accelerometers: bool,
     /// White standard deviation of the baseline, rounding included, deg/s.

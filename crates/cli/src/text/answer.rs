@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use diagnosis::result::{Finding, Parameter, Unexplained};
 use model::effect::Parameters;
-use model::effects::effect;
+use model::effects::{effect, wandering_line};
 use model::one_source;
 use model::record::Base;
 
@@ -121,7 +121,11 @@ fn on_others(finding: &Finding) -> Option<String> {
 fn felt(finding: &Finding) -> Option<String> {
     let all = finding.per_channel.values().chain([&finding.parameters]);
     let all: Vec<(&str, f64)> = all.flat_map(one_source::others).collect();
-    let least = all.iter().map(|(_, v)| *v).reduce(f64::min)?;
+    let Some(least) = all.iter().map(|(_, v)| *v).reduce(f64::min) else {
+        let tones = finding.per_channel.values();
+        let tones = tones.filter(|p| wandering_line::is_of_rotor(p)).count();
+        return (tones > 1).then(|| "One rotor shakes them.".to_owned());
+    };
     let is_other = |name: &&str| !finding.channels.iter().any(|c| c == name);
     let others: BTreeSet<&str> = all.iter().map(|(name, _)| *name).filter(is_other).collect();
     let others: Vec<&str> = others.into_iter().collect();

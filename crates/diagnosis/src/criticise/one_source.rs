@@ -11,7 +11,7 @@ use std::f64::consts::{SQRT_2, TAU};
 use std::sync::Arc;
 
 use model::effect::{Parameters, Peak, Signal};
-use model::effects::effect;
+use model::effects::{effect, wandering_line::is_of_rotor};
 use model::one_source::{self, Wander};
 use model::record::Quantity;
 use rustfft::FftPlanner;
@@ -365,7 +365,8 @@ pub(crate) fn found(searched: &[Searched<'_>]) -> Vec<OneSource> {
 /// Whether a finding of several channels is one source that these feel.
 pub(crate) fn is_shared(f: &Finding) -> bool {
     let mut all = f.per_channel.values().flat_map(one_source::others);
-    all.any(|(of, _)| f.channels.iter().any(|c| c == of))
+    let of_rotor = f.per_channel.values().filter(|p| is_of_rotor(p));
+    all.any(|(of, _)| f.channels.iter().any(|c| c == of)) || of_rotor.count() > 1
 }
 
 /// Whether a finding is an oscillation that this channel reads too.
@@ -400,7 +401,19 @@ pub(crate) fn state(
             (first, &a.name, coherence, a.phase, a.lr)
         });
         let name = &of_first.target.name;
-        let felt = others.iter().map(|m| (m, name, m.coherence, m.phase, m.lr));
+        // What two tones of a rotor have in common is the rotor, where no accelerometer reads it.
+        let by_rotor = |m: &&Member| {
+            let term = |m: &Member| {
+                searched[m.band.axis]
+                    .state
+                    .terms
+                    .get(*m.band.terms.first()?)
+            };
+            let pair = term(first).zip(term(m));
+            source.accelerations.is_empty() && pair.is_some_and(|(a, b)| a.turns_with(b))
+        };
+        let felt = others.iter().filter(|m| !by_rotor(m));
+        let felt = felt.map(|m| (m, name, m.coherence, m.phase, m.lr));
         for (m, name, coherence, phase, lr) in read.chain(felt) {
             let of: Option<Parameters> = one_source::of_axis(name, coherence, phase);
             let axis = m.band.axis;

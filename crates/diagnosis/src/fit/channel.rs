@@ -20,6 +20,9 @@ pub const ID: &str = "beyond";
 /// Scores closer than this (twice 3 nats) leave the answer open.
 pub const RIVAL_SPAN: f64 = 6.0;
 
+/// Place of the correlation time of its pitch among what is stated of a tone that was tracked.
+const PITCH_TIME: usize = 4;
+
 /// Largest width at half power over the centre: a mode of a lower quality factor than 3 is hardly one, and what wanders, bent
 /// by what a random walk takes up, has such a peak.
 const NARROW: f64 = 1.0 / 3.0;
@@ -131,7 +134,7 @@ impl Term {
     /// Whether it and another one are tones of one rotor that shakes several channels: their pitches stay for one time. What one channel
     /// alone has need be no rotor.
     pub(crate) fn turns_with(&self, other: &Self) -> bool {
-        let stays = |t: &Self| Some(t.stated.as_ref()?.last()?.0);
+        let stays = |t: &Self| Some(t.stated.as_ref()?.get(PITCH_TIME)?.0);
         self.is_shared_tone() && other.is_shared_tone() && stays(self) == stays(other)
     }
 

@@ -2,12 +2,12 @@
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
-use rand_distr::{Distribution, StandardNormal, Uniform};
+use rand_distr::{Distribution, Uniform};
 
 use super::narrow_band::LEAST_SAMPLES;
 use crate::effect::{
     Docs, Effect, Example, Found, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
-    optional, parameter, value,
+    detail, optional, parameter, value,
 };
 use crate::one_source::{self, with_shared};
 use crate::parameter::Parameter;
@@ -22,6 +22,12 @@ pub const ID: &str = "wandering_line";
 /// Name of the correlation time of the pitch: to the last digit the same of all tones of one rotor.
 pub const PITCH_TIME: &str = "pitch_time";
 
+/// Name of the multiple of its rotor's pitch that a tone turns at.
+pub const MULTIPLE: &str = "multiple";
+
+/// Name of the phase of a tone less that many times its rotor's.
+pub const ROTOR_PHASE: &str = "rotor_phase";
+
 /// The one instance that the library lists.
 pub static EFFECT: WanderingLine = WanderingLine;
 
@@ -31,7 +37,7 @@ impl Effect for WanderingLine {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] = &with_shared::<5, 17>([
+        const PARAMETERS: &[ParameterSpec] = &with_shared::<7, 19>([
             parameter("amplitude", "deg/s", "amplitude"),
             parameter(
                 "center_frequency",
@@ -52,6 +58,16 @@ impl Effect for WanderingLine {
                 PITCH_TIME,
                 "s",
                 "correlation time of its frequency; left out, the phase is a random walk",
+            ),
+            detail(
+                MULTIPLE,
+                "1",
+                "times the pitch of the rotor that it turns with, below 0 where sampling turns it back: tones of one pitch_time turn with one rotor",
+            ),
+            detail(
+                ROTOR_PHASE,
+                "rad",
+                "its phase less that many times the phase of that rotor",
             ),
         ]);
         PARAMETERS
@@ -142,33 +158,22 @@ impl Effect for WanderingLine {
             value(parameters, "center_frequency"),
         );
         let width = value(parameters, "linewidth");
-        let step = (TAU * width / simulation.rate_hz).max(0.0).sqrt();
         let turn = TAU * centre / simulation.rate_hz;
-        let time = value(parameters, PITCH_TIME) * simulation.rate_hz;
-        let rms = TAU * value(parameters, "pitch_rms") / simulation.rate_hz;
-        let stays = (rms > 0.0 && time > 0.0).then(|| (rms, (-1.0 / time).exp()));
         let keeps = simulation.keeps(parameters);
         for &axis in channels {
             let split = simulation.split(axis, [centre, width], parameters);
             let own = amplitude * split.own;
+            let off = match Tone::of(parameters).filter(|_| split.is_own()) {
+                Some(tone) => simulation.turned(&tone, parameters),
+                None => simulation.wandered(parameters),
+            };
             let mut turning = Vec::new();
-            let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(&mut simulation.rng));
-            let mut off = stays.map_or(0.0, |(rms, _)| rms * simulation.normal());
-            for i in 0..simulation.samples {
-                let (sin, cos) = phase.sin_cos();
-                simulation.rate[axis][i] += own * cos;
+            for (i, (rate, off)) in simulation.rate[axis].iter_mut().zip(off).enumerate() {
+                let (sin, cos) = (turn * i as f64 + off).sin_cos();
+                *rate += own * cos;
                 if keeps {
                     turning.push([cos, sin].map(|v| split.own * v));
                 }
-                let by: f64 = StandardNormal.sample(&mut simulation.rng);
-                phase += match stays {
-                    Some((rms, keep)) => {
-                        let before = off;
-                        off = keep * off + rms * (1.0 - keep * keep).sqrt() * by;
-                        turn + 0.5 * (before + off)
-                    }
-                    None => turn + step * by,
-                };
             }
             // Its standard deviation, and quadratures over that.
             let rms = amplitude / SQRT_2;
@@ -178,25 +183,126 @@ impl Effect for WanderingLine {
     }
 
     fn same_event(&self, a: &Parameters, b: &Parameters) -> bool {
-        one_source::is_one(a, b, "linewidth")
+        one_source::is_one(a, b, "linewidth") || is_one_multiple(a, b)
+    }
+}
+
+/// Whether a tone is one of those of a rotor.
+#[must_use]
+pub fn is_of_rotor(parameters: &Parameters) -> bool {
+    Tone::of(parameters).is_some()
+}
+
+/// Whether two tones turn at one multiple with one rotor.
+fn is_one_multiple(a: &Parameters, b: &Parameters) -> bool {
+    let same = |name: &str| {
+        let [a, b] = [a, b].map(|p| p.get(name).map(|p| p.value));
+        a.is_some() && a == b
+    };
+    same(PITCH_TIME) && same(MULTIPLE)
+}
+
+/// The tone of a rotor: by how much its phase is the rotor's.
+struct Tone {
+    /// Time that the rotor's pitch stays for, s: the same of all its tones.
+    time: f64,
+    multiple: f64,
+    phase: f64,
+}
+
+impl Tone {
+    fn of(parameters: &Parameters) -> Option<Self> {
+        let value = |name: &str| parameters.get(name).map(|p| p.value);
+        Some(Self {
+            time: value(PITCH_TIME)?,
+            multiple: value(MULTIPLE).filter(|m| *m != 0.0)?,
+            phase: value(ROTOR_PHASE)?,
+        })
+    }
+}
+
+/// By how much the phase of a rotor is ahead of its mean pitch at each sample, rad.
+#[derive(Clone, Debug)]
+pub struct Turned {
+    /// Time that its pitch stays for, s.
+    time: f64,
+    phases: Vec<f64>,
+}
+
+/// Turns of a phase among which every multiple of a small denominator has any phase: the pitch may have a half and a third.
+const WHOLE: f64 = 6.0;
+
+impl Simulation {
+    /// The phase of a tone beyond its mean frequency, that of the rotor of all tones that stay for one time.
+    fn turned(&mut self, tone: &Tone, parameters: &Parameters) -> Vec<f64> {
+        let known = self.rotors.iter().position(|r| r.time == tone.time);
+        let k = known.unwrap_or_else(|| {
+            // Any phase of the whole: the tone's own, and what turns it on.
+            let mut phases = self.wandered(parameters);
+            let first = phases.first().copied().unwrap_or(0.0);
+            phases
+                .iter_mut()
+                .for_each(|p| *p = WHOLE * first + (*p - first) / tone.multiple);
+            self.rotors.push(Turned {
+                time: tone.time,
+                phases,
+            });
+            self.rotors.len() - 1
+        });
+        let all = self.rotors[k].phases.iter();
+        all.map(|p| tone.multiple * p + tone.phase).collect()
+    }
+
+    /// The phase of a tone that turns by itself, beyond its mean frequency.
+    fn wandered(&mut self, parameters: &Parameters) -> Vec<f64> {
+        let width = value(parameters, "linewidth");
+        let step = (TAU * width / self.rate_hz).max(0.0).sqrt();
+        let time = value(parameters, PITCH_TIME) * self.rate_hz;
+        let rms = TAU * value(parameters, "pitch_rms") / self.rate_hz;
+        let stays = (rms > 0.0 && time > 0.0).then(|| (rms, (-1.0 / time).exp()));
+        let mut phase = Uniform::new(-PI, PI).map_or(0.0, |u| u.sample(&mut self.rng));
+        let mut off = stays.map_or(0.0, |(rms, _)| rms * self.normal());
+        let samples = 0..self.samples;
+        let next = |_| {
+            let now = phase;
+            let by = self.normal();
+            phase += match stays {
+                Some((rms, keep)) => {
+                    let before = off;
+                    off = keep * off + rms * (1.0 - keep * keep).sqrt() * by;
+                    0.5 * (before + off)
+                }
+                None => step * by,
+            };
+            now
+        };
+        samples.map(next).collect()
     }
 }
 
 /// The parameters of a tone whose phase was tracked: amplitude in the unit of the channel; mean, half width at half power and
-/// standard deviation of its frequency, rad per sample; the correlation time of that, samples; each with its standard error.
+/// standard deviation of its frequency, rad per sample; the correlation time of that, samples; each with its standard error. One of several
+/// of a rotor also has its multiple of the pitch, and its phase, rad.
 fn tracked(found: &Found, all: [(f64, f64); 5]) -> Parameters {
     let hz = found.rate_hz / TAU;
     let [size, mean, half, rms, time] = all;
     let told = |(v, e): (f64, f64), by: f64, unit| Parameter::estimated(v * by, e * by, unit);
-    [
+    let own = [
         ("amplitude", told(size, 1.0, &found.unit)),
         ("center_frequency", told(mean, hz, "Hz")),
         ("linewidth", told(half, 2.0 * hz, "Hz")),
         ("pitch_rms", told(rms, hz, "Hz")),
         (PITCH_TIME, told(time, found.rate_hz.recip(), "s")),
-    ]
-    .map(|(name, p)| (name.to_owned(), p))
-    .into()
+    ];
+    let of_rotor = match found.coefficients[all.len()..] {
+        [(multiple, _), phase] => Some([
+            (MULTIPLE, Parameter::exact(multiple, "1")),
+            (ROTOR_PHASE, told(phase, 1.0, "rad")),
+        ]),
+        _ => None,
+    };
+    let each = own.into_iter().chain(of_rotor.into_iter().flatten());
+    each.map(|(name, p)| (name.to_owned(), p)).collect()
 }
 
 /// Phase, rad, that a departure of the pitch turns by in its correlation time, from which on the line is normal to a hundredth.

@@ -241,6 +241,7 @@ impl Prepared {
         let present = self.present;
         self.run.shared.iter_mut().for_each(Vec::clear);
         self.run.felt.iter_mut().for_each(Vec::clear);
+        self.run.rotors.clear();
         self.run.own = [1.0; 3];
         for axis in 0..3 {
             let start = start.map(|all| all[axis].as_slice());
@@ -436,6 +437,7 @@ fn started(world: World, rate_hz: f64, rng: Xoshiro256PlusPlus) -> Simulation {
         scale: [1.0; 3],
         rate: std::array::from_fn(|_| vec![0.0; samples]),
         felt: None,
+        rotors: vec![],
         of_accelerometers: false,
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],

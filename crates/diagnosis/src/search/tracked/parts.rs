@@ -8,7 +8,7 @@ use numerics::column::dot;
 use rustfft::num_complex::Complex;
 
 use super::claims::claim_of_part;
-use super::rotor::{LEAST_PART, Rotor};
+use super::rotor::{LEAST_PART, Rotor, folded};
 use super::{LEAST_BLOCKS, MOST_DOUBLED, Place, REACH, TrackedTone};
 use super::{places, turned_back, without_others};
 use crate::fit::channel::{Path, State};
@@ -55,9 +55,17 @@ impl Search<'_> {
         path.amplitude = a.hypot(b);
         let ahead = -b.atan2(a);
         path.phase.iter_mut().for_each(|(phase, _)| *phase += ahead);
-        tone.stated[0] = (path.amplitude, (density / (0.5 * (p + r))).sqrt());
+        let error = (density / (0.5 * (p + r))).sqrt();
+        tone.stated[0] = (path.amplitude, error);
+        let of_rotor = (of.tones() > 1).then(|| {
+            let multiple = ratio * folded(ratio * of.lead.path.omega).1;
+            [(multiple, 0.0), (ahead, error / path.amplitude)]
+        });
         let course = path.course(n);
         let mut term = self.described(tone.stated, &tone.path, density, nats)?;
+        term.stated
+            .iter_mut()
+            .for_each(|s| s.extend(of_rotor.iter().flatten()));
         // Where it is, the rotor tells: it is not the best of all places.
         term.threshold = term.threshold.min(2.0 * LEAST_PART);
         term.claims.push(of.claim.clone());
