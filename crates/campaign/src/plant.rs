@@ -198,6 +198,7 @@ fn blank(stand: &Stand) -> Simulation {
         white_sigma: [0.0; 3],
         rounding: [0.0; 3],
         felt: None,
+        rotors: vec![],
         of_accelerometers: false,
         shared: Default::default(),
         own: [1.0; 3],

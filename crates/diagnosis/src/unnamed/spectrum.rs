@@ -61,7 +61,8 @@ pub(super) fn as_one(s: &Searched<'_>, least: usize) -> Vec<AsOne> {
     let terms = &s.state.terms;
     let tone = |t: &&Term| {
         let hypothesis = &s.search.candidates[t.candidate].hypothesis;
-        !matches!(hypothesis, Hypothesis::Covariance(_))
+        // One whose phase was tracked has the shape that its law says.
+        t.path.is_none() && !matches!(hypothesis, Hypothesis::Covariance(_))
     };
     let first = |t: &&Term| t.cluster.is_some_and(|c| c.place == 0);
     let all = terms.iter().filter(first).filter(tone).map(|t| {

@@ -208,16 +208,18 @@ fn unlike(f: &Facts<'_>) -> bool {
     CheckId::OF_PROCESS.into_iter().any(|id| f.fails(id))
 }
 
-/// Whether a channel has more bands than separate causes make: they are one structure. Harmonics are one with the lowest of them.
+/// Whether a channel has more bands than separate causes make: they are one structure. Harmonics are one with the lowest of them, and so
+/// are the tones of a rotor.
 fn crowded(f: &Facts<'_>) -> bool {
     let bands = f.s.state.terms.iter();
     let bands = bands.filter(|t| t.is_band() && !t.is_part());
-    let mut peaks: Vec<Peak> = bands.filter_map(Term::peak).collect();
-    peaks.sort_by(|a, b| a.omega.total_cmp(&b.omega));
-    let mut alone: Vec<Peak> = vec![];
-    for peak in peaks {
-        if !alone.iter().any(|low| is_harmonic(&peak, low)) {
-            alone.push(peak);
+    let mut bands: Vec<(Peak, &Term)> = bands.filter_map(|t| Some((t.peak()?, t))).collect();
+    bands.sort_by(|a, b| a.0.omega.total_cmp(&b.0.omega));
+    let mut alone: Vec<(Peak, &Term)> = vec![];
+    for (peak, term) in bands {
+        let is_one = |(low, of): &(Peak, &Term)| of.turns_with(term) || is_harmonic(&peak, low);
+        if !alone.iter().any(is_one) {
+            alone.push((peak, term));
         }
     }
     alone.len() > MOST_ALIKE

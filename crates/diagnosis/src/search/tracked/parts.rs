@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use numerics::column::dot;
+use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::claims::claim_of_part;
@@ -15,6 +16,9 @@ use crate::fit::channel::{Path, State};
 use crate::search::Search;
 use crate::test_level::Outcome;
 use model::effect::Peak;
+
+/// How often the band of a tone is doubled, so that its phase is known within a block in which its size is asked.
+const FINER: u32 = 4;
 
 impl Search<'_> {
     /// The tones of a channel that are parts of a rotor.
@@ -98,30 +102,52 @@ impl Search<'_> {
         let spacing = self.spacing();
         let reach = (REACH * peak.half_width / spacing).max(LEAST_BLOCKS as f64) as usize;
         let middle = (peak.omega / spacing) as usize;
-        let from = middle.checked_sub(reach).filter(|f| *f > 0)?;
-        if from + 2 * reach > n {
-            return None;
-        }
+        let about = |reach: usize| {
+            let from = middle.checked_sub(reach).filter(|f| *f > 0)?;
+            (middle + reach <= n).then_some(from..middle + reach)
+        };
+        let here = about(reach)?;
         let tone_again = self.panel.dct.forward(&tone.course);
         let without = without_others(self, rest, &[]);
-        let here = from..from + 2 * reach;
-        let pairs = without[here.clone()].iter().zip(&tone_again[here.clone()]);
-        let coefficients: Vec<f64> = pairs.map(|(w, t)| w + t).collect();
         let noise = rest.noise.through(here.map(|k| k as f64 * spacing));
         let density = rest.solution.white * noise.iter().sum::<f64>() / noise.len() as f64;
-        let turn = (from + reach) as f64 * spacing;
+        // So far either side that the pitch turns no block by itself.
+        let finer = (0..=FINER)
+            .rev()
+            .find_map(|f| Some((1 << f, about(reach << f)?)));
+        let (finer, wide) = finer?;
+        let pairs = without[wide.clone()].iter().zip(&tone_again[wide]);
+        let coefficients: Vec<f64> = pairs.map(|(w, t)| w + t).collect();
+        let turn = middle as f64 * spacing;
+        let length = n as f64 / (finer * reach) as f64;
+        let at = |block: usize| (block as f64 + 1.0) * length - 0.5;
         let blocks = turned_back(&coefficients, turn, n);
+        let still = blocks.into_iter().enumerate().map(|(k, z)| {
+            let turned = turn * at(k) - path.at(at(k)).0;
+            z * Complex::from_polar(1.0, turned)
+        });
+        let blocks = slowed(still.collect(), finer);
         let length = n as f64 / reach as f64;
         let noise = 2.0 * density / length;
         let size = path.amplitude;
         let along = blocks.iter().enumerate().map(|(k, z)| {
-            let at = (k as f64 + 1.0) * length - 0.5;
-            let (phase, doubt) = path.at(at);
-            let z = z * Complex::from_polar(1.0, turn * at - phase);
+            let (_, doubt) = path.at((k as f64 + 1.0) * length - 0.5);
             let spread = noise + 0.5 * (size * doubt).powi(2);
             (z.re - size * (-0.5 * doubt).exp()) / spread.sqrt()
         });
         let along: Vec<f64> = along.collect();
         Some(claim_of_part(&along, size, noise, tone.among))
     }
+}
+
+/// A series without what turns faster than once in twice as many values, in one value for so many.
+fn slowed(mut z: Vec<Complex<f64>>, many: usize) -> Vec<Complex<f64>> {
+    let count = z.len();
+    let slower = count / many;
+    let mut planner = FftPlanner::new();
+    planner.plan_fft_forward(count).process(&mut z);
+    let half = slower / 2;
+    z.drain(slower - half..count - half);
+    planner.plan_fft_inverse(slower).process(&mut z);
+    z.iter().map(|v| v / count as f64).collect()
 }

@@ -14,7 +14,9 @@ use model::tone::Reading;
 use rustfft::num_complex::Complex;
 
 use super::phase::{Coordinates, FORGOTTEN, Tracked, likeliest};
-use super::{Attempt, LARGEST_DOUBT, LEAST_BLOCKS, LEAST_REACH, REACH, Stated};
+use super::{
+    Attempt, LARGEST_DOUBT, LEAST_BLOCKS, LEAST_REACH, MARGIN, MOST_DOUBLED, REACH, Stated,
+};
 use super::{all_about, density, places, turned_back, widest};
 use crate::fit::channel::{Form, Path, State, Term};
 use crate::fit::likelihood::Noise;
@@ -244,37 +246,70 @@ fn blocks_for(lead: &Lead, widest: f64, n: usize) -> usize {
     held.clamp(LEAST_BLOCKS, apart.max(LEAST_BLOCKS))
 }
 
+/// What channels tell of a phase in so many blocks: what they have of it, the phase, and by how many nats that is ahead of noise.
+struct Told {
+    parts: Vec<Part>,
+    lead: Lead,
+    nats: f64,
+}
+
+/// The phase by multiples that are asked for, told by one that is known; none where the pitch itself is not heard, or its phase is in
+/// doubt.
+fn told(all: &[Heard], asked: &[f64], before: &Lead, count: usize) -> Option<Told> {
+    let n = all.first()?.coefficients.len();
+    let each = asked.iter().flat_map(|r| all.iter().map(move |h| (h, *r)));
+    let found = each.filter_map(|(h, r)| part(h, r, before, count));
+    let found = found.filter(|p| p.nats > LEAST_PART).collect();
+    let parts = apart(found, before.path.omega, count as f64 * PI / n as f64);
+    let of = |ratio: &f64| {
+        let there = parts.iter().filter(|p| p.ratio.total_cmp(ratio).is_eq());
+        let there: Vec<&Part> = there.collect();
+        (!there.is_empty()).then(|| combined(&there))
+    };
+    let readings: Vec<_> = asked.iter().filter_map(of).collect();
+    if readings.first().is_none_or(|(ratio, ..)| *ratio != 1.0) {
+        return None;
+    }
+    let (lead, nats) = followed(&readings, before, n as f64 / count as f64)?;
+    Some(Told { parts, lead, nats })
+}
+
+/// The same in blocks that are halved as long as that tells more: a phase that all tell together is known within blocks in which
+/// none of them alone tells it.
+fn in_shorter_blocks(all: &[Heard], asked: &[f64], mut best: Told, mut count: usize) -> Told {
+    for _ in 0..MOST_DOUBLED {
+        count *= 2;
+        let next = told(all, asked, &best.lead, count);
+        let tells_more =
+            |t: &Told| t.parts.len() == best.parts.len() && t.nats > best.nats + MARGIN;
+        match next.filter(tells_more) {
+            Some(next) => best = next,
+            None => break,
+        }
+    }
+    best
+}
+
 /// The rotor that is heard about a tone of one channel; none where it is a line, or a noise of one channel.
 fn rotor(all: &[Heard], seed: Seed) -> Option<Rotor> {
     let n = all.first()?.coefficients.len();
-    let (mut lead, mut found) = (seed.lead, vec![]);
-    for round in 0..ROUNDS {
-        let widest = (found.iter()).map(|p: &Part| p.ratio).fold(1.0, f64::max);
-        let count = blocks_for(&lead, widest, n);
-        let asked: Vec<f64> = match round {
-            0 => vec![1.0],
-            _ => ratios().collect(),
-        };
-        let each = asked.iter().flat_map(|r| all.iter().map(move |h| (h, *r)));
-        found = each
-            .filter_map(|(h, r)| part(h, r, &lead, count))
-            .filter(|p| p.nats > LEAST_PART)
-            .collect();
-        found = apart(found, lead.path.omega, count as f64 * PI / n as f64);
-        let of = |ratio: &f64| {
-            let there = found.iter().filter(|p| p.ratio.total_cmp(ratio).is_eq());
-            let there: Vec<&Part> = there.collect();
-            (!there.is_empty()).then(|| combined(&there))
-        };
-        let readings: Vec<_> = asked.iter().filter_map(of).collect();
-        if readings.first().is_none_or(|(ratio, ..)| *ratio != 1.0) {
-            return None;
+    let multiples: Vec<f64> = ratios().collect();
+    let mut found = told(all, &[1.0], &seed.lead, blocks_for(&seed.lead, 1.0, n))?;
+    for round in 1..ROUNDS {
+        let widest = found.parts.iter().map(|p| p.ratio).fold(1.0, f64::max);
+        let count = blocks_for(&found.lead, widest, n);
+        found = told(all, &multiples, &found.lead, count)?;
+        if round + 1 == ROUNDS {
+            found = in_shorter_blocks(all, &multiples, found, count);
         }
-        lead = followed(&readings, &lead, n as f64 / count as f64)?;
     }
-    let shared = found.iter().any(|p| p.heard != found[0].heard);
+    let Told {
+        parts, mut lead, ..
+    } = found;
+    let shared = parts.iter().any(|p| p.heard != parts[0].heard);
     Arc::make_mut(&mut lead.path).shared = shared;
-    let parts = found.iter().filter_map(|p| Some((p.target?, p.ratio)));
+    let is_alone = parts.len() == 1;
+    let parts = parts.iter().filter_map(|p| Some((p.target?, p.ratio)));
     let rotor = Rotor {
         lead,
         claim: seed.claim,
@@ -282,11 +317,15 @@ fn rotor(all: &[Heard], seed: Seed) -> Option<Rotor> {
     };
     let is_course = seed.log_time > FORGOTTEN.ln();
     let is_line = rotor.lead.stated[2].0 < NARROWEST * PI / n as f64;
-    (!is_line && (is_course || found.len() > 1)).then_some(rotor)
+    (!is_line && (is_course || !is_alone)).then_some(rotor)
 }
 
-/// The phase by some readings of it, block by block of a length, and what is told of it.
-fn followed(readings: &[(f64, f64, Vec<[f64; 2]>)], before: &Lead, length: f64) -> Option<Lead> {
+/// The phase by some readings of it, block by block of a length, what is told of it, and by how many nats it is ahead of noise.
+fn followed(
+    readings: &[(f64, f64, Vec<[f64; 2]>)],
+    before: &Lead,
+    length: f64,
+) -> Option<(Lead, f64)> {
     let [_, _, _, (pitch, _), (time, _)] = before.stated;
     let start = [0.0, (pitch * length).ln(), (time / length).ln(), 0.0];
     let each = readings.iter().map(|(ratio, variance, blocks)| Reading {
@@ -295,13 +334,14 @@ fn followed(readings: &[(f64, f64, Vec<[f64; 2]>)], before: &Lead, length: f64) 
         blocks,
     });
     let seen: Tracked = likeliest(&each.collect::<Vec<_>>(), &[start as Coordinates]);
+    let nats = seen.nats;
     let attempt = Attempt {
         seen,
         middle: before.path.omega,
         length,
     };
     let lead = Lead::of(&attempt);
-    (lead.path.doubt() < LARGEST_DOUBT).then_some(lead)
+    (lead.path.doubt() < LARGEST_DOUBT).then_some((lead, nats))
 }
 
 /// A tone that one channel tells by itself, what its pitch claims, and the logarithm of its correlation time, blocks.
