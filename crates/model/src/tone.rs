@@ -11,6 +11,9 @@ const PITCH: [f64; 2] = [1e-6, 0.7];
 /// Blocks to a correlation time below which the variances are those of a series: the exact ones cancel.
 const SERIES: f64 = 0.02;
 
+/// A product of spreads over that of the noise beyond which its logarithm is taken.
+const LARGE: f64 = 1e100;
+
 /// What is foreseen of the next block: the exact integral of an Ornstein-Uhlenbeck process (D. T. Gillespie, Phys. Rev. E 54 (1996)
 /// 2084).
 pub struct Law {
@@ -152,8 +155,14 @@ impl<'a> Reading<'a> {
     }
 
     /// What a block tells of a tone of an amplitude: what is believed then, by how many nats it is ahead of noise, and how far it is from
-    /// what was believed.
-    fn told(&self, block: usize, believed: Belief, amplitude: f64) -> (Belief, f64, [f64; 2]) {
+    /// what was believed. Of the nats half the logarithm of `spread`, which it multiplies, is to be taken off.
+    fn told(
+        &self,
+        block: usize,
+        believed: Belief,
+        amplitude: f64,
+        spread: &mut f64,
+    ) -> (Belief, f64, [f64; 2]) {
         let [re, im] = self.blocks[block];
         let (a, k, variance) = (amplitude, self.ratio, self.variance);
         let (sin, cos) = (k * believed.phase).sin_cos();
@@ -165,9 +174,9 @@ impl<'a> Reading<'a> {
         let doubt = k * k * p;
         let along = variance + 0.5 * (a * doubt).powi(2);
         let short = turned[0] - a * (-0.5 * doubt).exp();
-        let mut nats = 0.5 * ((re * re + im * im) / variance);
-        nats -= 0.5 * (turned[1].powi(2) / across + (across / variance).ln());
-        nats -= 0.5 * (short * short / along + (along / variance).ln());
+        let nats = 0.5
+            * ((re * re + im * im) / variance - turned[1].powi(2) / across - short * short / along);
+        *spread *= (across / variance) * (along / variance);
         let gain = [moves * p / across, moves * q / across];
         let told = Belief {
             phase: believed.phase + gain[0] * turned[1],
@@ -213,18 +222,23 @@ pub fn follow(readings: &[Reading<'_>], law: &Law, mut seen: impl FnMut(&Step)) 
         told: now,
         surprise: [0.0; 2],
     });
-    let mut nats = 0.0;
+    let (mut nats, mut spread) = (0.0, 1.0f64);
     for block in 1..first.blocks.len() {
         let foreseen = now.next(law);
         let mut surprise = [0.0; 2];
         now = foreseen;
         for (i, reading) in readings.iter().enumerate() {
-            let (told, ahead, off) = reading.told(block, now, a);
+            let (told, ahead, off) = reading.told(block, now, a, &mut spread);
             if i == 0 {
                 surprise = off;
             }
             nats += ahead;
             now = told;
+            // One logarithm for many blocks: neither factor is below 1.
+            if spread > LARGE {
+                nats -= 0.5 * spread.ln();
+                spread = 1.0;
+            }
         }
         seen(&Step {
             foreseen,
@@ -232,6 +246,7 @@ pub fn follow(readings: &[Reading<'_>], law: &Law, mut seen: impl FnMut(&Step)) 
             surprise,
         });
     }
+    nats -= 0.5 * spread.ln();
     if nats.is_finite() { nats } else { f64::MIN }
 }
 

@@ -28,7 +28,7 @@ use claims::claim;
 use numerics::column::dot;
 use numerics::order_statistics::median;
 use numerics::tails;
-use phase::{Tracked, tracked};
+use phase::{Coordinates, Tracked, tracked};
 pub(crate) use rotor::{Rotor, rotors};
 
 /// Half widths of a peak, either side, that its tone is sought in: a normal law of that half width at half power ends at 3.5 of its
@@ -82,8 +82,14 @@ struct Attempt {
 }
 
 impl Attempt {
-    /// Over the coefficients between angular frequencies, in noise of that density; none where the phase is not told there.
-    fn over(coefficients: &[f64], (from, to): (f64, f64), density: f64) -> Option<Self> {
+    /// Over the coefficients between angular frequencies, in noise of that density, sought from the law on that one over fewer of them
+    /// told; none where the phase is not told there.
+    fn over(
+        coefficients: &[f64],
+        (from, to): (f64, f64),
+        density: f64,
+        before: Option<&Self>,
+    ) -> Option<Self> {
         let n = coefficients.len();
         let to_k = n as f64 / PI;
         // Neither a slow process nor what half the sample rate turns back.
@@ -97,7 +103,8 @@ impl Attempt {
         let middle = (from + count) as f64 / to_k;
         let blocks = turned_back(&coefficients[from..from + 2 * count], middle, n);
         let length = n as f64 / count as f64;
-        let seen = tracked(&blocks, 2.0 * density / length);
+        let before = before.map(|b| b.in_blocks(length, middle));
+        let seen = tracked(&blocks, 2.0 * density / length, before);
         let doubt = seen.phase.iter().map(|p| p.1).sum::<f64>() / seen.phase.len() as f64;
         let times = blocks.len() as f64 * (-seen.at[2]).exp();
         (doubt < LARGEST_DOUBT && times > LEAST_TIMES).then_some(Self {
@@ -105,6 +112,14 @@ impl Attempt {
             middle,
             length,
         })
+    }
+
+    /// Its law in blocks of another length that are turned back by another frequency.
+    fn in_blocks(&self, length: f64, middle: f64) -> Coordinates {
+        let [amplitude, pitch, time, mean] = self.seen.at;
+        let longer = length / self.length;
+        let mean = (self.middle + mean / self.length - middle) * length;
+        [amplitude, pitch + longer.ln(), time - longer.ln(), mean]
     }
 
     fn path(&self) -> Path {
@@ -153,14 +168,16 @@ impl Attempt {
 }
 
 /// The attempt over as much about a place, by how often that is doubled, as tells more of its tone, and what that claims.
-fn widest(mut over: impl FnMut(f64) -> Option<Attempt>) -> Option<(Attempt, Outcome)> {
+fn widest(
+    mut over: impl FnMut(f64, Option<&Attempt>) -> Option<Attempt>,
+) -> Option<(Attempt, Outcome)> {
     let mut tries: Vec<Attempt> = vec![];
     // Long blocks show a departure of the pitch best; of its memory, those over which it turns the phase by less than noise does: a
     // block tells the mean of the phase.
     let is_point = |t: &Attempt| t.seen.turned < t.seen.noise / t.seen.at[0].exp().powi(2);
     let mut shorter = None;
     for doubled in 0..MOST_DOUBLED {
-        let Some(attempt) = over(f64::from(1 << doubled)) else {
+        let Some(attempt) = over(f64::from(1 << doubled), tries.last()) else {
             continue;
         };
         let before = tries.last().map_or(f64::MIN, |t| t.seen.nats);

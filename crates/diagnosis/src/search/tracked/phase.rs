@@ -53,26 +53,39 @@ fn law_at(x: &[f64], blocks: usize) -> Law {
     Law::new(x[0].exp(), x[1].exp(), time, x[3])
 }
 
-/// The likeliest law of blocks beside noise of that variance in either part, and what it says of every block.
-pub(super) fn tracked(blocks: &[Complex<f64>], variance: f64) -> Tracked {
+/// The likeliest law of blocks beside noise of that variance in either part, and what it says of every block; sought from a law on
+/// that longer blocks told, where they did.
+pub(super) fn tracked(
+    blocks: &[Complex<f64>],
+    variance: f64,
+    before: Option<Coordinates>,
+) -> Tracked {
+    let parts: Vec<[f64; 2]> = blocks.iter().map(|z| [z.re, z.im]).collect();
+    let reading = [Reading::of_tone(&parts, variance)];
+    if let Some(before) = before {
+        return likeliest(&reading, &[before]);
+    }
     let count = blocks.len() as f64;
     let energy = blocks.iter().map(Complex::norm_sqr).sum::<f64>() / count;
     let amplitude = (energy - 2.0 * variance).max(variance).sqrt();
     let turn: Complex<f64> = blocks.windows(2).map(|w| w[1] * w[0].conj()).sum();
-    let parts: Vec<[f64; 2]> = blocks.iter().map(|z| [z.re, z.im]).collect();
     let starts = STARTS.map(|(spread, time)| [amplitude.ln(), spread.ln(), time.ln(), turn.arg()]);
-    likeliest(&[Reading::of_tone(&parts, variance)], &starts)
+    likeliest(&reading, &starts)
 }
 
 /// The likeliest law of some readings of one phase, from some coordinates on.
 pub(super) fn likeliest(readings: &[Reading<'_>], starts: &[Coordinates]) -> Tracked {
     let count = readings.first().map_or(0, |r| r.blocks.len());
     let below = |x: &[f64]| -follow(readings, &law_at(x, count), |_| {});
-    let looks = starts
-        .iter()
-        .map(|start| nelder_mead(&below, start, &STEPS, LOOK));
-    let best = looks.min_by(|a, b| below(a).total_cmp(&below(b)));
-    let best = nelder_mead(&below, &best.unwrap_or_default(), &STEPS, LAST);
+    let best = match starts {
+        [one] => one.to_vec(),
+        _ => {
+            let looks = starts.iter().map(|s| nelder_mead(&below, s, &STEPS, LOOK));
+            let best = looks.min_by(|a, b| below(a).total_cmp(&below(b)));
+            best.unwrap_or_default()
+        }
+    };
+    let best = nelder_mead(&below, &best, &STEPS, LAST);
     let mut at = [0.0; 4];
     at.iter_mut().zip(&best).for_each(|(a, b)| *a = *b);
     at[2] = at[2].clamp(SHORTEST.ln(), (count as f64).ln());

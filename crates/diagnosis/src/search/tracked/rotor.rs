@@ -360,9 +360,9 @@ fn seed(heard: &Heard, peak: &Peak) -> Option<Seed> {
     let bins = |omega: f64| ((omega / spacing).max(1.0) as usize).min(n);
     let about = all_about(bins(peak.omega - half), bins(peak.omega + half), n);
     let density = density(&coefficients[about]);
-    let over = |by: f64| {
+    let over = |by: f64, before: Option<&Attempt>| {
         let (from, to) = (peak.omega - by * half, peak.omega + by * half);
-        Attempt::over(coefficients, (from, to), density)
+        Attempt::over(coefficients, (from, to), density, before)
     };
     let (best, claim) = widest(over)?;
     Some(Seed {

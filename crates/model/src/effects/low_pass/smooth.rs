@@ -2,6 +2,8 @@
 //! the spectrum of a scalar time series", Biometrika 60, 1973). Moving averages, windows of several taps and filters of higher
 //! order have one each.
 
+use std::sync::LazyLock;
+
 use crate::effect::{Covariance, Frequencies, Parameters};
 
 /// Names of the cosines' coefficients in a model file, by lag.
@@ -76,7 +78,37 @@ pub(super) fn cosine_sum(coefficients: &[f64], cosine: f64) -> f64 {
 
 /// Cosines of the places.
 pub(super) fn places() -> impl Iterator<Item = f64> {
-    (0..PLACES).map(|i| ((i as f64 + 0.5) * std::f64::consts::PI / PLACES as f64).cos())
+    static PLACED: LazyLock<Vec<f64>> = LazyLock::new(|| {
+        let angle = |i: usize| (i as f64 + 0.5) * std::f64::consts::PI / PLACES as f64;
+        (0..PLACES).map(|i| angle(i).cos()).collect()
+    });
+    PLACED.iter().copied()
+}
+
+/// Cosines of the multiples of some angles, from once the angle on: cos (k + 1) w = 2 cos w cos k w - cos (k - 1) w.
+struct Multiples<'a> {
+    once: &'a [f64],
+    before: Vec<f64>,
+    now: Vec<f64>,
+}
+
+impl<'a> Multiples<'a> {
+    /// Of angles of these cosines.
+    fn of(once: &'a [f64]) -> Self {
+        Self {
+            once,
+            before: once.to_vec(),
+            now: vec![1.0; once.len()],
+        }
+    }
+
+    fn next(&mut self) -> &[f64] {
+        for ((before, now), once) in self.before.iter_mut().zip(&self.now).zip(self.once) {
+            *before = 2.0 * once * now - *before;
+        }
+        std::mem::swap(&mut self.before, &mut self.now);
+        &self.now
+    }
 }
 
 /// Mean over all frequencies of the exponential.
@@ -103,9 +135,9 @@ pub(super) fn lag1(coefficients: &[(f64, f64)]) -> (f64, f64) {
     for c in places() {
         let d = cosine_sum(&values, c).exp() / mean / PLACES as f64;
         lag1 += d * c;
-        let angle = c.acos();
-        for (k, (alone, both)) in alone.iter_mut().zip(&mut both).enumerate() {
-            let bend = (angle * (k + 1) as f64).cos();
+        let (mut before, mut bend) = (c, 1.0);
+        for (alone, both) in alone.iter_mut().zip(&mut both) {
+            (before, bend) = (bend, 2.0 * c * bend - before);
             *alone += d * bend;
             *both += d * c * bend;
         }
@@ -202,16 +234,18 @@ impl Covariance for Smooth {
     fn slopes(&self, theta: &[f64], at: &Frequencies) -> Option<Vec<Vec<f64>>> {
         let own = density(theta, at);
         let mean = mean(theta);
-        let weights: Vec<(f64, f64)> = places()
-            .map(|c| (c.acos(), cosine_sum(theta, c).exp() / mean / PLACES as f64))
-            .collect();
-        let of = |k: usize| {
-            let lag = (k + 1) as f64;
-            let level: f64 = weights.iter().map(|(w, d)| d * (lag * w).cos()).sum();
-            let each = own.iter().zip(&at.omega);
-            each.map(|(d, w)| d * ((lag * w).cos() - level)).collect()
+        let cosines: Vec<f64> = places().collect();
+        let weights = cosines
+            .iter()
+            .map(|c| cosine_sum(theta, *c).exp() / mean / PLACES as f64);
+        let weights: Vec<f64> = weights.collect();
+        let (mut over, mut there) = (Multiples::of(&cosines), Multiples::of(&at.cosine));
+        let of = |_: &f64| {
+            let level: f64 = weights.iter().zip(over.next()).map(|(w, b)| w * b).sum();
+            let each = own.iter().zip(there.next());
+            each.map(|(d, bend)| d * (bend - level)).collect()
         };
-        Some((0..theta.len()).map(of).collect())
+        Some(theta.iter().map(of).collect())
     }
 
     fn bounds(&self, _samples: usize) -> Vec<(f64, f64)> {
