@@ -285,6 +285,38 @@ fn a_model_with_its_signs_turned_is_told_to_be_worse_than_nothing() {
 }
 
 #[test]
+fn a_wrong_model_is_not_excused_by_the_noise_that_it_claims() {
+    let folder = folder("correct_excused");
+    let seconds = ["--no-replicates", "--seconds", "300", "--longest", "300"];
+    whole(&folder, "tempco", 5, &seconds);
+    let right = std::fs::read_to_string(folder.join("run-5.toml")).unwrap();
+    let wrong = folder.join("wrong.toml");
+    for noisier in [1.0, 3.0] {
+        let mut model = ModelFile::parse(&right).unwrap();
+        // Gyro y has no slope; its angle over 100 s becomes four times as wrong.
+        let mut slope = model.effects[0].clone();
+        assert_eq!(slope.channels, ["gyro_x"]);
+        slope.channels = vec!["gyro_y".to_owned()];
+        slope.parameters.get_mut("slope").unwrap().value = 0.01;
+        model.effects.push(slope);
+        for channel in &mut model.channels {
+            let n = channel.baseline.get_mut("angle_random_walk").unwrap();
+            n.value *= noisier;
+        }
+        std::fs::write(&wrong, model.to_toml()).unwrap();
+        let by = ["--correct-by", wrong.to_str().unwrap()];
+        let answer = whole(&folder, "tempco", 5, &[&seconds[..], &by].concat());
+        let told = (answer["angle_errors"][0]["rows"].as_array().unwrap().iter())
+            .find(|row| row["channel"] == "gyro_y" && row["span_s"] == 100.0);
+        let row = told.unwrap();
+        let of = |key: &str| row[key].as_f64().unwrap();
+        assert!(of("after_deg") > 3.0 * of("before_deg"), "{row}");
+        assert_eq!(row["worse"], true, "N times {noisier}: {row}");
+        assert_eq!(answer["worse"], true);
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_loop() {
     let folder = folder("correct_same");
     let once = |name: &str| {
