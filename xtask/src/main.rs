@@ -2,6 +2,7 @@
 
 mod answers;
 mod campaign;
+mod closed;
 mod demo;
 mod effects;
 mod fuzz;
@@ -41,6 +42,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
   mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
            --seed N and --count N draw, --minutes N bounds, --write keeps docs/mutants.txt, --registers plants those that only the image has
+  loop     grades the loop over draws: recorded, diagnosed, the board corrected, recorded again; --draws N by the firmware's
+           logic, --image N through its image, --seed N; --write keeps docs/loop.txt; 100 and 10 take 40 minutes of a core
   page     builds the page that runs the engine in a browser: target/page/index.html
   wheel    builds the Python package, target/wheel/dist/*.whl, and tests it in a virtual environment of its own;
            --dev compiles it as tests are
@@ -97,6 +100,7 @@ fn main() -> ExitCode {
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
+        Some("loop") => closed::grade(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("size") => size::report(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("soak") => soak::soak(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("fuzz") => fuzz::fuzz(&root, &std::env::args().skip(2).collect::<Vec<_>>()),

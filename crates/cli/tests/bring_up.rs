@@ -111,6 +111,7 @@ fn a_weak_supply_and_a_gyro_that_is_silent_are_wrong() {
         "motor's stop, let go",
         "supply, by the gyros",
         "flags of the samples",
+        "stalls and faults, as counted",
         "registers of gyro y",
         "self-test of gyro y",
     ] {

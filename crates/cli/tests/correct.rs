@@ -2,12 +2,14 @@
 //! another history. Graded by the angle errors of the corrected rates against those of the same board on a stand with nothing
 //! wrong.
 //!
-//! A run of the tests makes a few draws. `IMU_STAND_LOOPS` sets how many, `IMU_STAND_SEED` replays them;
-//! `IMU_STAND_LOOPS=100 cargo test -p imu-stand --test correct -- --nocapture` is the campaign of docs/measurements.md.
+//! A run of the tests makes a few draws. `IMU_STAND_LOOPS` sets how many, `IMU_STAND_SEED` replays them, `IMU_STAND_THROUGH=image`
+//! takes the image in the simulated ATmega16, and answers that lie in the folder `IMU_STAND_KEPT` are not made again. `cargo xtask
+//! loop` sets them, and writes docs/loop.txt.
 
 mod common;
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -21,6 +23,11 @@ const NEAR: f64 = 1.15;
 const ASKED: f64 = 0.90;
 /// Chance of failing a loop that just meets what is asserted.
 const CHANCE: f64 = 1e-3;
+/// The image, for whom `IMU_STAND_THROUGH` asks.
+const IMAGE: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../target/avr/avr-none/firmware/firmware.elf"
+);
 /// What is drawn: each kind whose cause the board has a term for, and all three at once as often as all others.
 const KINDS: [&str; 6] = [
     "uncalibrated",
@@ -35,14 +42,17 @@ fn drawn(number: &str, or: u64) -> u64 {
     std::env::var(number).map_or(or, |text| text.parse().expect("a number"))
 }
 
-/// Runs the loop; its answer.
-fn whole(folder: &std::path::Path, hide: &str, seed: u64, more: &[&str]) -> Value {
+/// Runs the loop on the firmware's logic; its answer.
+fn whole(folder: &Path, hide: &str, seed: u64, more: &[&str]) -> Value {
+    looped(folder, hide, seed, &[&["--native"], more].concat())
+}
+
+fn looped(folder: &Path, hide: &str, seed: u64, more: &[&str]) -> Value {
     let out = folder.join(format!("run-{seed}.csv"));
     let answer = folder.join(format!("loop-{seed}.json"));
     let (seed, out) = (seed.to_string(), out.to_str().unwrap());
     let mut all = vec![
         "run",
-        "--native",
         "--correct",
         "--hide",
         hide,
@@ -55,6 +65,20 @@ fn whole(folder: &std::path::Path, hide: &str, seed: u64, more: &[&str]) -> Valu
     all.extend(more);
     assert_success(&run(&all));
     json(&answer)
+}
+
+/// The loop of a draw; of its files the answer is kept, which is written whole.
+fn drawn_loop(folder: &Path, hide: &str, seed: u64, way: &[&str]) -> Value {
+    let own = folder.join(format!("draw-{seed}"));
+    std::fs::create_dir_all(&own).unwrap();
+    let answer = looped(&own, hide, seed, &[&["--no-replicates"], way].concat());
+    std::fs::rename(
+        own.join(format!("loop-{seed}.json")),
+        folder.join(format!("loop-{seed}.json")),
+    )
+    .unwrap();
+    std::fs::remove_dir_all(own).unwrap();
+    answer
 }
 
 /// Angle errors: axis, record, span, before, after, predicted, limit.
@@ -88,7 +112,10 @@ fn a_correction_by_what_was_found_comes_near_what_the_noise_alone_leaves() {
     let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     let seed = drawn("IMU_STAND_SEED", clock.unwrap().as_secs());
     println!("IMU_STAND_SEED={seed} IMU_STAND_LOOPS={draws}");
-    let folder = folder("correct");
+    let folder =
+        std::env::var_os("IMU_STAND_KEPT").map_or_else(|| folder("correct"), PathBuf::from);
+    std::fs::create_dir_all(&folder).unwrap();
+    let through_image = std::env::var_os("IMU_STAND_THROUGH").is_some_and(|what| what == "image");
     let (next, all) = (AtomicU64::new(0), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {
         for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -101,7 +128,18 @@ fn a_correction_by_what_was_found_comes_near_what_the_noise_alone_leaves() {
                     // Kinds go round from one that the seed chooses.
                     let kind = KINDS[(seed.wrapping_add(number) % KINDS.len() as u64) as usize];
                     let own = seed.wrapping_mul(1000).wrapping_add(number);
-                    let answer = whole(&folder, kind, own, &["--no-replicates"]);
+                    let kept = folder.join(format!("loop-{own}.json"));
+                    let answer = if kept.exists() {
+                        json(&kept)
+                    } else {
+                        let way: &[&str] = if through_image {
+                            &["--longest", "1260", "--image", IMAGE]
+                        } else {
+                            &["--native"]
+                        };
+                        drawn_loop(&folder, kind, own, way)
+                    };
+                    eprintln!("draw {number}: {kind}, seed {own}");
                     all.lock().unwrap().push((number, kind, own, answer));
                 }
             });
@@ -282,6 +320,38 @@ fn a_model_with_its_signs_turned_is_told_to_be_worse_than_nothing() {
         .max_by(|a, b| a.2[0].total_cmp(&b.2[0]))
         .unwrap();
     assert!(*after > 1.6 * before, "{before} -> {after}");
+}
+
+#[test]
+fn a_wrong_model_is_not_excused_by_the_noise_that_it_claims() {
+    let folder = folder("correct_excused");
+    let seconds = ["--no-replicates", "--seconds", "300", "--longest", "300"];
+    whole(&folder, "tempco", 5, &seconds);
+    let right = std::fs::read_to_string(folder.join("run-5.toml")).unwrap();
+    let wrong = folder.join("wrong.toml");
+    for noisier in [1.0, 3.0] {
+        let mut model = ModelFile::parse(&right).unwrap();
+        // Gyro y has no slope; its angle over 100 s becomes four times as wrong.
+        let mut slope = model.effects[0].clone();
+        assert_eq!(slope.channels, ["gyro_x"]);
+        slope.channels = vec!["gyro_y".to_owned()];
+        slope.parameters.get_mut("slope").unwrap().value = 0.01;
+        model.effects.push(slope);
+        for channel in &mut model.channels {
+            let n = channel.baseline.get_mut("angle_random_walk").unwrap();
+            n.value *= noisier;
+        }
+        std::fs::write(&wrong, model.to_toml()).unwrap();
+        let by = ["--correct-by", wrong.to_str().unwrap()];
+        let answer = whole(&folder, "tempco", 5, &[&seconds[..], &by].concat());
+        let told = (answer["angle_errors"][0]["rows"].as_array().unwrap().iter())
+            .find(|row| row["channel"] == "gyro_y" && row["span_s"] == 100.0);
+        let row = told.unwrap();
+        let of = |key: &str| row[key].as_f64().unwrap();
+        assert!(of("after_deg") > 3.0 * of("before_deg"), "{row}");
+        assert_eq!(row["worse"], true, "N times {noisier}: {row}");
+        assert_eq!(answer["worse"], true);
+    }
 }
 
 #[test]

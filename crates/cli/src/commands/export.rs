@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use imu_stand::correct::keep_what_is_more_than_its_error;
 use imu_stand::export::board::BoardCorrection;
 use imu_stand::export::data::{DataError, Table};
 use imu_stand::export::noise::{Consumer, ImuNoise};
@@ -95,14 +96,16 @@ const SENS_AVG: u16 = 0x0402;
 
 fn board(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
-    let model = export_source::model(&arguments.file)?;
-    let board = BoardCorrection::of(&model, SENS_AVG).map_err(|error| {
+    let mut model = export_source::model(&arguments.file)?;
+    let refused = keep_what_is_more_than_its_error(&mut model);
+    let mut board = BoardCorrection::of(&model, SENS_AVG).map_err(|error| {
         miette::miette!(
             help = "docs/wire-format.md lists what the board holds",
             "{}: {error}",
             arguments.file.display()
         )
     })?;
+    board.notes.extend(refused);
     match &arguments.out {
         Some(out) => super::write(out, &board.table()),
         None => {

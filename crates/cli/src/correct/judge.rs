@@ -21,6 +21,8 @@ pub(super) const SPANS_AT_LEAST: f64 = 2.0;
 /// Standard deviations that hold an error of the bias 95 times of 100: what is worse by no more is chance. A bias that is off adds
 /// its angle to each window's, and so to their root mean square as much at the most (Minkowski).
 const NORMAL_95: f64 = 1.96;
+/// Pairs of means, side by side, from which on their spread says something.
+const SIDE_BY_SIDE: usize = 4;
 /// Blocks that the filter knows are counted in 1/256.
 const KNOWN_ONE: f64 = 256.0;
 /// Share of its rows that a window has readings in, at least.
@@ -116,6 +118,8 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
         let (corrected, limit) = (of_board(record), stage.limit.map(of_board));
         let noise = &stage.noise[axis];
         let bias = bias_variance(noise, stage.corrected, axis, rest, rate_hz);
+        // A model that is wrong may be so in its noise, too: it gets no more than the readings themselves show.
+        let unsure = variance_of_means(&read, rest).map_or(bias, |shown| bias.min(shown));
         for span_s in SPANS_S {
             let over = |errors: &[f64]| {
                 let enough =
@@ -125,7 +129,7 @@ pub fn judge(stage: &Stage<'_>, matters: f64) -> Judged {
             let (Some(before_deg), Some(after_deg)) = (over(&read), over(&corrected)) else {
                 continue;
             };
-            let chance = NORMAL_95 * bias.sqrt() * span_s;
+            let chance = NORMAL_95 * unsure.sqrt() * span_s;
             rows.push(Row {
                 channel,
                 span_s,
@@ -217,6 +221,27 @@ pub(super) fn rms(errors: &[f64], rest: usize, span_s: f64, rate_hz: f64) -> Opt
     (count > 0.0).then(|| (squares / count).sqrt())
 }
 
+/// Allan variance over so many rows, of windows each begun a tenth after the one before: what the mean over a rest of that length is
+/// off as the bias at its end, by what the readings themselves show. Nothing where few of them stand side by side.
+fn variance_of_means(values: &[f64], length: usize) -> Option<f64> {
+    let step = (length / OVERLAP).max(1);
+    let means: Vec<f64> = values
+        .windows(length.max(1))
+        .step_by(step)
+        .map(mean)
+        .collect();
+    let apart = length / step;
+    let (mut squares, mut count) = (0.0, 0usize);
+    for (one, next) in means.iter().zip(means.get(apart..)?) {
+        let square = (next - one).powi(2);
+        if square.is_finite() {
+            squares += square;
+            count += 1;
+        }
+    }
+    (count >= SIDE_BY_SIDE * OVERLAP).then(|| squares / (2.0 * count as f64))
+}
+
 /// Variance of the bias that the filter had at the end of the rest, (deg/s)^2: as it says, else that of a mean over the rest.
 fn bias_variance(
     noise: &Noise,
@@ -244,6 +269,25 @@ mod tests {
         assert_eq!(rms(&errors, 200, 150.0, 20.0), None, "no span");
         let left = rms(&without_rest(errors, 200), 200, 10.0, 20.0);
         assert!(left.unwrap() < 1e-9);
+    }
+
+    #[test]
+    fn what_a_mean_is_off_is_told_by_the_readings_where_there_are_some() {
+        // White noise of sigma^2 = 1/3 and a ramp, which a mean over 100 rows follows late.
+        let mut state = 1u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let noise: Vec<f64> = (0..40_000).map(|_| uniform()).collect();
+        let white = variance_of_means(&noise, 100).expect("enough");
+        assert!((white * 300.0 - 1.0).abs() < 0.2, "{white}");
+        let ramp: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        let of_ramp = variance_of_means(&ramp, 100).expect("enough");
+        assert!((of_ramp - 0.5).abs() < 1e-9, "{of_ramp}");
+        assert_eq!(variance_of_means(&ramp[..500], 100), None);
     }
 
     #[test]

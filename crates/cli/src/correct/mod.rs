@@ -14,5 +14,5 @@ pub use judge::{Judged, Row, SPANS_S, Stage, States, judge};
 pub use length::{NEAR, Needed, needed, short};
 pub use noise::{Noise, Uncertain};
 pub use record::{Course, Taken, record};
-pub use worth::keep_what_is_worth_it;
+pub use worth::{keep_what_is_more_than_its_error, keep_what_is_worth_it};
 pub use write::{Change, Proposed, in_use};

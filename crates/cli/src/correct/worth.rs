@@ -18,8 +18,22 @@ const NORMAL_95: f64 = 1.96;
 /// Causes whose coefficients multiply channels of their own, and stand alone.
 const ALONE: [&str; 2] = ["cross_axis", "g_sensitivity"];
 
-/// Takes out of a model what a correction by it would make worse; says what, and why.
+/// Takes out of the model of a diagnosis what a correction by it would make worse; says what, and why.
 pub fn keep_what_is_worth_it(model: &mut ModelFile) -> Vec<String> {
+    keep(model, |effect| {
+        scale_is_beyond_tilt(effect).and_then(|()| is_more_than_its_error(effect))
+    })
+}
+
+/// The same of any model: a scale may have been told by turns that gravity counts, and stays.
+pub fn keep_what_is_more_than_its_error(model: &mut ModelFile) -> Vec<String> {
+    keep(model, is_more_than_its_error)
+}
+
+fn keep(
+    model: &mut ModelFile,
+    worth: impl Fn(&mut EffectModel) -> Result<(), String>,
+) -> Vec<String> {
     let mut refused = Vec::new();
     model.effects.retain_mut(|effect| match worth(effect) {
         Ok(()) => true,
@@ -40,9 +54,8 @@ fn is_worth(p: &Parameter) -> bool {
         .is_none_or(|error| p.value.abs() > WORTH * error)
 }
 
-fn worth(effect: &mut EffectModel) -> Result<(), String> {
-    let cause = effect.cause.as_str();
-    if cause == "scale_error"
+fn scale_is_beyond_tilt(effect: &mut EffectModel) -> Result<(), String> {
+    if effect.cause == "scale_error"
         && let Some(relative) = effect.parameters.get("relative")
     {
         let error = NORMAL_95 * relative.std_error.unwrap_or(0.0);
@@ -55,7 +68,11 @@ fn worth(effect: &mut EffectModel) -> Result<(), String> {
             ));
         }
     }
-    if ALONE.contains(&cause) {
+    Ok(())
+}
+
+fn is_more_than_its_error(effect: &mut EffectModel) -> Result<(), String> {
+    if ALONE.contains(&effect.cause.as_str()) {
         for p in effect.parameters.values_mut().filter(|p| !is_worth(p)) {
             p.value = 0.0;
         }
@@ -97,6 +114,21 @@ mod tests {
                     .all(|why| why.starts_with("scale_error on gyro_x is not corrected: "))
             );
         }
+    }
+
+    #[test]
+    fn a_scale_that_turns_told_stays_and_what_is_no_more_than_its_error_goes() {
+        let mut text = ModelFile::paper().to_toml();
+        text.push_str("[[effect]]\ncause = \"scale_error\"\nchannels = [\"gyro_z\"]\nrelative = { value = 0.01, std_error = 0.001, unit = \"1\" }\n");
+        text.push_str("[[effect]]\ncause = \"g_sensitivity\"\nchannels = [\"gyro_x\"]\nacc_x = { value = -0.02, std_error = 0.017, unit = \"deg/s/g\" }\nacc_y = { value = 0.005, std_error = 0.017, unit = \"deg/s/g\" }\n");
+        let mut model = ModelFile::parse(&text).expect("a model");
+        let refused = keep_what_is_more_than_its_error(&mut model);
+        let left: Vec<&str> = model.effects.iter().map(|e| e.cause.as_str()).collect();
+        assert_eq!(left, ["scale_error"]);
+        assert!(
+            refused[0].starts_with("g_sensitivity on gyro_x is not corrected: "),
+            "{refused:?}"
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
-use imu_stand::correct::{Change, Proposed};
+use imu_stand::correct::{Change, Proposed, keep_what_is_more_than_its_error};
 use miette::Result;
 use serde::Serialize;
 use wire::Command;
@@ -63,14 +63,16 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
         }
         return Ok(());
     };
-    let model = super::super::read_model(path)?;
-    let proposed = Proposed::of(&mut session.link, &model)?.map_err(|error| {
+    let mut model = super::super::read_model(path)?;
+    let refused = keep_what_is_more_than_its_error(&mut model);
+    let mut proposed = Proposed::of(&mut session.link, &model)?.map_err(|error| {
         miette::miette!(
             help = "nothing was written; docs/wire-format.md lists what the board holds",
             "{}: {error}",
             path.display()
         )
     })?;
+    proposed.board.notes.extend(refused);
     if !session.quiet {
         for change in &proposed.changed {
             let (axis, what, unit) = (change.axis, change.what, change.unit);

@@ -12,7 +12,7 @@ use imu_stand::capture::SUPPLY_LSB_V;
 use imu_stand::link::{Link, words};
 use miette::Result;
 use serde::Serialize;
-use wire::{Axis, Command, Frame, Hello, Sample, Sensor, Status, flags};
+use wire::{Axis, Command, Frame, Health, Hello, Sample, Sensor, Status, flags};
 
 use super::super::flash::{self, Programmer};
 use super::Session;
@@ -112,7 +112,7 @@ const REGISTERS: [(Register, &str, u16); 4] = [
 ];
 
 /// What no simulation and no line shows; hardware.md has what it matters for.
-const SCOPE: [(&str, &str); 10] = [
+const SCOPE: [(&str, &str); 11] = [
     (
         "MISO high level with each gyro selected",
         "3.3 V or more; below it a 74HCT125 at 5 V goes into the line",
@@ -128,6 +128,10 @@ const SCOPE: [(&str, &str); 10] = [
     (
         "gyro word to word, one gyro",
         "40 us from start to start, 30 us between",
+    ),
+    (
+        "CS x, y, z: trigger on a low longer than 20 us, for a minute",
+        "none: a word takes 11 us; a byte that stalls holds its CS for 26 us or more, and `board health` counts it as spi_stalled",
     ),
     (
         "OC2 at `board motor --duty 60`",
@@ -152,7 +156,9 @@ pub fn run(session: &mut Session, arguments: &Arguments) -> Result<()> {
     info.corrected_by(super::correction_in_use(&mut session.link)?);
     set_up(&hello, &mut steps);
     stop_let_go(&mut session.link, &mut steps)?;
+    let before = session.link.ask_health(false)?;
     listened(&mut session.link, &hello, &mut steps)?;
+    counted(&mut session.link, &before, &mut steps)?;
     registers(&mut session.link, &mut steps)?;
     self_tests(&mut session.link, &mut steps)?;
     by_hand(session, arguments, &mut steps)?;
@@ -311,6 +317,27 @@ fn listened(link: &mut Link, hello: &Hello, steps: &mut Vec<Step>) -> Result<()>
         odd == 0,
     ));
     steps.extend(clock(hello, &samples));
+    Ok(())
+}
+
+/// What the board counted meanwhile: stalls of SPI and ADC, gyros that are silent or in error, what the line lost.
+fn counted(link: &mut Link, before: &Health, steps: &mut Vec<Step>) -> Result<()> {
+    let now = link.ask_health(false)?;
+    let new: Vec<String> = (now.faults.iter().zip(before.faults.iter()))
+        .filter(|((_, now), (_, before))| now > before)
+        .map(|((fault, now), (_, before))| format!("{} {}", fault.name(), now - before))
+        .collect();
+    let found = if new.is_empty() {
+        format!("nothing new in {LISTEN_S} s")
+    } else {
+        new.join(", ")
+    };
+    steps.push(step(
+        "stalls and faults, as counted",
+        found,
+        "nothing new (docs/wire-format.md has the counters)",
+        new.is_empty(),
+    ));
     Ok(())
 }
 
