@@ -348,6 +348,19 @@ pub(super) fn stated_time(names: &[String]) -> Option<usize> {
     all.next().filter(|_| all.next().is_none())
 }
 
+/// The place of the column of dates whose time of day is in the column at `time`, as it stands beside it.
+pub(super) fn date_of(names: &[String], time: usize) -> Option<usize> {
+    let is_date = |at: &usize| {
+        names
+            .get(*at)
+            .is_some_and(|name| words(name).iter().any(|w| w == "date"))
+    };
+    [time.checked_sub(1), Some(time + 1)]
+        .into_iter()
+        .flatten()
+        .find(is_date)
+}
+
 /// The places of the columns whose names say that they are times; of dates, where there is none.
 pub(super) fn times(names: &[String]) -> Vec<usize> {
     let meanings = meanings(names);
