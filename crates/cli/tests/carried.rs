@@ -128,6 +128,38 @@ fn readings_behind_their_names_are_the_columns_of_those_names() {
 }
 
 #[test]
+fn a_row_may_have_several_lines() {
+    let of = |k: usize| 0.001 * (k % 50) as f64;
+    let sample = |k: usize| {
+        format!(
+            "Acceleration X: 0.10, Y: 0.20, Z: 9.80 m/s^2\nRotation X: 0.01, Y: -0.02, Z: {:.3} rad/s\nTemperature: 25.{} degC\n",
+            of(k),
+            k % 7
+        )
+    };
+    let indented = |k: usize| {
+        format!(
+            "\t\tTemperature 25.{} deg C\n\n\t\tAccel X: 0.1 \tY: 0.2 \tZ: 9.8 m/s^2 \n\t\tGyro X: 0.01 \tY: 0.02 \tZ: {:.3} radians/s \n",
+            k % 7,
+            of(k)
+        )
+    };
+    for text in [rows(60, sample), rows(60, indented)] {
+        let text = format!("starts\nsensor found\n{text}");
+        let record = read(&text, "", Some(50.0));
+        let record = record.unwrap_or_else(|error| panic!("{:?}", miette::Report::new(error)));
+        is_at(&record, "gyro_z", 20, of(20).to_degrees());
+        is_at(&record, "acc_z", 20, 9.8);
+        let temp = &record.channel("temp").expect("a thermometer").values;
+        assert_eq!((temp.len(), temp[20]), (60, 25.6));
+        // A sample of which a line is missing is told with its place.
+        let short = text.replacen("9.8", "lost", 5).replacen("lost", "9.8", 4);
+        let error = read(&short, "", Some(50.0)).expect_err("a line says something else");
+        assert!(error.to_string().contains("line "), "{error}");
+    }
+}
+
+#[test]
 fn a_row_that_lacks_a_reading_is_refused_with_its_line() {
     let text = rows(60, |k| match k {
         30 => "ax:0.1,gx:".to_owned(),

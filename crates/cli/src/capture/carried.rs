@@ -13,7 +13,7 @@ mod objects;
 mod received;
 mod sentences;
 
-use labels::Labels;
+use labels::{BETWEEN, Cycle, Labels};
 use messages::Messages;
 use objects::Objects;
 use received::Received;
@@ -140,7 +140,12 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
         lines.pop();
     }
     lines.retain(|line| !line.is_empty() && !line.starts_with(['#', '%']));
-    let form = Form::of(&lines);
+    let (form, cycle) = match Form::of(&lines) {
+        Some(form) => (Some(form), None),
+        None => Labels::over_lines(&lines)
+            .map(|(labels, cycle)| (Form::Labels(labels), cycle))
+            .unzip(),
+    };
     drop(lines);
     drop(text);
     let input = Cursor::new(head).chain(input);
@@ -156,6 +161,8 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
     let rows = Rows {
         input,
         form,
+        cycle,
+        held: Vec::new(),
         told,
         line: Vec::new(),
         made: Vec::new(),
@@ -167,6 +174,9 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
 struct Rows<R> {
     input: R,
     form: Form,
+    /// Where a row has several lines, and those of the next one.
+    cycle: Option<Cycle>,
+    held: Vec<String>,
     told: Rc<RefCell<Carried>>,
     line: Vec<u8>,
     /// The line that was made, and how much of it was given.
@@ -187,7 +197,25 @@ impl<R: BufRead> Rows<R> {
         let line = String::from_utf8_lossy(&self.line);
         let mut row = String::new();
         let mut told = self.told.borrow_mut();
-        let line = line.trim();
+        let mut line = line.trim();
+        let joined;
+        if let Some(cycle) = &self.cycle {
+            if cycle.is_first(line) {
+                self.held.clear();
+            }
+            let is_more = !line.is_empty() && (!self.held.is_empty() || cycle.is_first(line));
+            if is_more {
+                self.held.push(line.to_owned());
+            }
+            if is_more && self.held.len() < cycle.count || line.is_empty() {
+                self.made.push(b'\n');
+                return Ok(());
+            }
+            if is_more {
+                joined = std::mem::take(&mut self.held).join(BETWEEN);
+                line = &joined;
+            }
+        }
         match self.form.row(line, &mut row) {
             Made::Row => {
                 told.rows += 1;

@@ -4,6 +4,27 @@
 use super::super::units::known;
 use super::{Made, SHOWN, behind_time, write_cells};
 
+/// Lines that a row may have.
+const LINES: usize = 6;
+/// Lines that may stand before the first row of several.
+const BEFORE: usize = 8;
+/// Lines in which rows of several are looked for.
+const LOOKED_AT: usize = 80;
+/// Between the lines of a row.
+pub(super) const BETWEEN: &str = " | ";
+
+/// Lines that make a row, and the words of the first.
+pub(super) struct Cycle {
+    pub count: usize,
+    first: Vec<String>,
+}
+
+impl Cycle {
+    pub fn is_first(&self, line: &str) -> bool {
+        Row::of(line).has_words(&self.first)
+    }
+}
+
 /// Rows whose words are the same in each.
 pub(super) struct Labels {
     pub names: Vec<String>,
@@ -13,6 +34,31 @@ pub(super) struct Labels {
 }
 
 impl Labels {
+    /// Rows of several lines each, and how many: a sketch prints a sensor a line.
+    pub fn over_lines(lines: &[&str]) -> Option<(Self, Cycle)> {
+        let lines = &lines[..lines.len().min(LOOKED_AT)];
+        let is_named = |line: &&&str| {
+            let row = Row::of(line);
+            !row.numbers.is_empty() && row.names().is_some()
+        };
+        if lines.iter().filter(is_named).count() < 2 * SHOWN {
+            return None;
+        }
+        let of = |(count, begin): (usize, usize)| {
+            let all = lines.get(begin..)?.chunks_exact(count);
+            let joined: Vec<String> = all.map(|lines| lines.join(BETWEEN)).collect();
+            let form = Self::of(&joined.iter().map(String::as_str).collect::<Vec<_>>())?;
+            let first = lines.get(begin).map(|line| Row::of(line).words())?;
+            // Else a row would have lines of two samples.
+            let is_begin = Row::of(joined.first()?).has_words(&form.words);
+            let is_row = |row: &&String| Row::of(row).has_words(&form.words);
+            let is_most = 5 * joined.iter().filter(is_row).count() >= 4 * joined.len();
+            (is_begin && is_most).then_some((form, Cycle { count, first }))
+        };
+        let ways = (2..=LINES).flat_map(|count| (0..count + BEFORE).map(move |from| (count, from)));
+        ways.into_iter().find_map(of)
+    }
+
     /// The words that most lines have, where each number has a name before it.
     pub fn of(lines: &[&str]) -> Option<Self> {
         let cut: Vec<Row<'_>> = lines.iter().map(|line| Row::of(line)).collect();
@@ -94,7 +140,7 @@ impl<'a> Row<'a> {
     fn names(&self) -> Option<Vec<String>> {
         let mut groups: Vec<Group<'_>> = Vec::new();
         for (k, text) in self.between.iter().enumerate() {
-            let (unit, label) = unit_and_label(text)?;
+            let (unit, label) = unit_and_label(text);
             if let Some(unit) = unit {
                 // Of all numbers since the last name that is more than an axis.
                 let begin = groups.iter().rposition(|group| !group.is_axis).unwrap_or(0);
@@ -114,8 +160,14 @@ impl<'a> Row<'a> {
                 None => groups.last_mut()?.count += 1,
             }
         }
-        let has_sign = |text: &&str| text.contains([':', '=']) && !text.contains(['"', '{', '<']);
-        if !self.between.iter().any(has_sign) {
+        // Words in a table are no names.
+        let has_sign = |text: &&&str| {
+            text.contains([':', '='])
+                && text.contains(char::is_alphabetic)
+                && !text.contains(['"', '{', '<'])
+        };
+        let signs = self.between.iter().filter(has_sign).count();
+        if 2 * signs < groups.len() {
             return None;
         }
         let mut stem = "";
@@ -160,23 +212,27 @@ fn is_axis(label: &str) -> bool {
     matches!(label, "x" | "y" | "z" | "X" | "Y" | "Z")
 }
 
-/// What stands between two numbers: the unit of the one before, and the name of the one behind. Nothing where there are
-/// words that are neither.
-fn unit_and_label(text: &str) -> Option<(Option<&'static str>, Option<&str>)> {
+/// What stands between two numbers: the unit of the one before, and the name of the one behind.
+fn unit_and_label(text: &str) -> (Option<&'static str>, Option<&str>) {
     let is_around = |c: char| !c.is_alphanumeric() && !matches!(c, '_' | '%' | '°');
     let inner = text.trim_matches(is_around);
-    if inner.is_empty() {
-        return Some((None, None));
+    if !inner.contains(char::is_alphabetic) {
+        return (None, None);
     }
     let is_named = text.trim_end().ends_with([':', '=', '(', '[']);
-    let first = inner.split([' ', ',', ';', '|', '\t']).next()?;
-    let unit = known(first.trim_end_matches([')', ']']));
-    let rest = inner[first.len()..].trim_start_matches(is_around);
+    // A unit may have a blank: `deg C`.
+    let mut ends = inner
+        .match_indices([' ', ',', ';', '|', '\t'])
+        .map(|(at, _)| at);
+    let first = ends.next().unwrap_or(inner.len());
+    let second = ends.next().unwrap_or(inner.len());
+    let unit = |end: usize| Some((known(inner[..end].trim_end_matches([')', ']']))?, end));
+    let unit = unit(second).or_else(|| unit(first));
+    let rest = unit.map_or(inner, |(_, end)| inner[end..].trim_start_matches(is_around));
     match unit {
-        Some(unit) if rest.is_empty() && !is_named => Some((Some(unit), None)),
-        Some(unit) if !rest.is_empty() => Some((Some(unit), Some(rest))),
-        _ if is_named => Some((None, Some(inner))),
-        _ => None,
+        Some((unit, _)) if rest.is_empty() && !is_named => (Some(unit), None),
+        Some((unit, _)) if !rest.is_empty() => (Some(unit), Some(rest)),
+        _ => (None, Some(inner)),
     }
 }
 
@@ -216,7 +272,7 @@ fn number(text: &str) -> usize {
     let rest = &text[end..];
     let letters = rest.find(|c: char| !c.is_alphanumeric() && !"/^²·°_%".contains(c));
     let letters = &rest[..letters.unwrap_or(rest.len())];
-    match letters.is_empty() || known(letters).is_some() {
+    match !letters.contains(char::is_alphabetic) || known(letters).is_some() {
         true => end,
         false => 0,
     }
