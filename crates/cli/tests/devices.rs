@@ -148,13 +148,14 @@ fn times_win_over_a_rate_that_is_stated_and_both_are_told() {
 }
 
 #[test]
-fn rows_that_repeat_their_names_are_no_table_and_a_way_to_one_is_told() {
-    for row in [
-        "AccelX:0.09,AccelY:-0.33,GyroX:0.01",
-        "AcX = 213 | AcY = -502 | GyX = 56",
-        "Rotation X: 0.01, Y: -0.01, Z: 0.00 rad/s",
+fn rows_that_repeat_their_names_in_turns_are_no_table_and_a_way_to_one_is_told() {
+    let turns = "abbabaaabbbabaababba";
+    for [one, other] in [
+        ["AccelX:0.09,AccelY:-0.33", "GyroX:0.01,GyroY:0.02"],
+        ["AcX = 213 | AcY = -502", "GyX = 56 | GyY = 57"],
     ] {
-        let said = refusal(&format!("{row}\n").repeat(20), "");
+        let row = |turn| format!("{}\n", if turn == 'a' { one } else { other });
+        let said = refusal(&turns.chars().map(row).collect::<String>(), "");
         assert!(
             said.contains("rows repeat the names of their readings") && said.contains("sed -E"),
             "{said}"

@@ -16,7 +16,7 @@ use super::mapped::{
 use super::names::{TIMES, in_its_place, left, not_read, other_clock, respelt, taken};
 use super::own::{own, take_counted};
 use super::preamble::Stated;
-use super::propose::{stated_time, times, unknown};
+use super::propose::{date_of, stated_time, times, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
@@ -167,7 +167,11 @@ fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
             Some(mapping) => {
                 let mut found = mapped(said, &mapping)?;
                 found.notes.push(taken(said, &mapping, &found));
-                let is_read = |at: usize| found.columns.iter().any(|c| c.at == at);
+                let is_date = |c: &Column, at| {
+                    matches!(c.role, Role::Time { .. }) && date_of(said.names, c.at) == Some(at)
+                };
+                let is_read =
+                    |at: usize| found.columns.iter().any(|c| c.at == at || is_date(c, at));
                 found.notes.extend(left(said.names, &is_read));
                 found
             }

@@ -24,7 +24,7 @@ const WRITERS: [(&str, &str); 8] = [
 pub(super) const DATAFLASH: &str = "TimeUS";
 
 /// Columns by which a file's writer is known, and the units of others in it.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 16] = [
     // `rostopic echo -p` stamps in nanoseconds.
     ("field.angular_velocity.x", "time", "ns"),
     ("gyro_rad[0]", "timestamp", "us"),
@@ -37,6 +37,13 @@ const FILES: [(&str, &str, &str); 10] = [
     (DATAFLASH, "accy", "m/s2"),
     (DATAFLASH, "accz", "m/s2"),
     (DATAFLASH, "t", "degC"),
+    // OpenLog Artemis: what its library for the ICM-20948 delivers.
+    ("rtcTime", "gx", "deg/s"),
+    ("rtcTime", "gy", "deg/s"),
+    ("rtcTime", "gz", "deg/s"),
+    ("rtcTime", "ax", "mg"),
+    ("rtcTime", "ay", "mg"),
+    ("rtcTime", "az", "mg"),
 ];
 
 /// The unit that a column's name says of what it is mapped to, beside the other columns of its file.
@@ -85,6 +92,8 @@ mod tests {
             ("x", gyro, &["seconds_elapsed"], Some("rad/s")),
             ("GyrX", gyro, &["TimeUS"], Some("rad/s")),
             ("AccZ", acc, &["TimeUS"], Some("m/s2")),
+            ("gX", gyro, &["rtcTime"], Some("deg/s")),
+            ("aZ", acc, &["rtcTime"], Some("mg")),
             ("GyrX", gyro, &none, None),
             // What a name does not say nobody knows.
             ("time", What::Time, &none, None),

@@ -136,12 +136,25 @@ impl Layout {
         }
     }
 
+    /// Takes the names that the rows carried.
+    pub fn take_names(&mut self, names: &[String]) {
+        if names.len() == self.names.len() {
+            self.names = names.to_vec();
+            self.numbered = false;
+            let units = names.iter().map(|name| in_brackets(name).1);
+            self.units = units.map(|unit| unit.map(str::to_owned)).collect();
+        }
+    }
+
     /// A row of units under the names.
     fn take_units(&mut self, text: &mut TextLines<impl BufRead>) -> Result<(), CaptureError> {
         let Some((_, line)) = &self.first else {
             return Ok(());
         };
-        let units = owned(&self.cells.cut(line));
+        let mut units = owned(&self.cells.cut(line));
+        if units.len() == self.names.len() + 1 && units.last().is_some_and(String::is_empty) {
+            units.pop();
+        }
         let bare = |unit: &str| bare_unit(unit).map(str::to_owned);
         let are_units = units.len() == self.names.len()
             && units
@@ -160,7 +173,7 @@ impl Layout {
 
 /// A unit in brackets or without.
 fn bare_unit(text: &str) -> Option<&'static str> {
-    known(text.trim_matches(['(', ')', '[', ']']))
+    known(text).or_else(|| known(text.trim_matches(['(', ')', '[', ']'])))
 }
 
 /// Lines before a table in which its names are looked for.

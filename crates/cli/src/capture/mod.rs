@@ -3,6 +3,7 @@
 mod angle;
 mod assumed;
 mod build;
+mod carried;
 mod cells;
 #[cfg(feature = "native")]
 mod codecs;

@@ -1,5 +1,7 @@
 //! The mapping that is proposed for a file whose columns have other names than ours.
 
+use std::collections::HashMap;
+
 use model::record::Quantity;
 
 use super::conventions::unit_of;
@@ -225,20 +227,27 @@ fn by_elimination(names: &[String], meanings: &[Meaning], seen: &Seen, guess: &m
     let first = |wanted: &dyn Fn(usize) -> bool| (0..meanings.len()).find(|at| wanted(*at));
     // Nor what has a place already, or a unit of something else.
     let taken: Vec<usize> = guess.columns.iter().map(|(_, at)| *at).collect();
-    let may_be = |at: usize| {
-        let unit = in_brackets(&names[at]).1;
-        let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro));
-        meanings[at].kind != Kind::Time && !taken.contains(&at) && unit.is_none_or(is_rate)
-    };
+    // Once each: a table may have a hundred thousand columns.
+    let may_be: Vec<bool> = (0..names.len())
+        .map(|at| {
+            let unit = in_brackets(&names[at]).1;
+            let is_rate = |unit| is_unit_of(unit, What::Channel(Quantity::Gyro));
+            meanings[at].kind != Kind::Time && !taken.contains(&at) && unit.is_none_or(is_rate)
+        })
+        .collect();
+    let may_be = |at: usize| may_be[at];
     // The other axes have the same name but for the axis.
     let stem = |at: usize| without_axis(in_brackets(&names[at]).0);
+    let mut of_stem: HashMap<Vec<String>, [Option<usize>; 3]> = HashMap::new();
+    for at in (0..names.len()).filter(|at| may_be(*at)) {
+        if let Some(axis) = meanings[at].axis.filter(|axis| *axis < AXES.len()) {
+            of_stem.entry(stem(at)).or_default()[axis].get_or_insert(at);
+        }
+    }
     let triple = |at: usize| {
-        let of_axis = |axis| {
-            let mut all = (0..names.len()).filter(|k| may_be(*k));
-            all.find(|k| meanings[*k].axis == Some(axis) && stem(*k) == stem(at))
-        };
-        match [0, 1, 2].map(of_axis) {
-            [Some(x), Some(y), Some(z)] if meanings[at].axis.is_some() => Some(vec![x, y, z]),
+        meanings[at].axis?;
+        match of_stem.get(&stem(at))? {
+            [Some(x), Some(y), Some(z)] => Some(vec![*x, *y, *z]),
             _ => None,
         }
     };
@@ -346,6 +355,19 @@ pub(super) fn stated_time(names: &[String]) -> Option<usize> {
     };
     let mut all = (0..names.len()).filter(|at| is_time(&names[*at]));
     all.next().filter(|_| all.next().is_none())
+}
+
+/// The place of the column of dates whose time of day is in the column at `time`, as it stands beside it.
+pub(super) fn date_of(names: &[String], time: usize) -> Option<usize> {
+    let is_date = |at: &usize| {
+        names
+            .get(*at)
+            .is_some_and(|name| words(name).iter().any(|w| w == "date"))
+    };
+    [time.checked_sub(1), Some(time + 1)]
+        .into_iter()
+        .flatten()
+        .find(is_date)
 }
 
 /// The places of the columns whose names say that they are times; of dates, where there is none.

@@ -8,6 +8,7 @@ use std::path::Path;
 use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
+use super::carried::as_table;
 use super::columns::{Column, Columns, Role, Said, columns};
 use super::corrected::without_unapplied;
 use super::error::brief;
@@ -105,8 +106,12 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
         return from_table(table?, options, Of::File);
     }
     no_topics(options)?;
-    let mut text = TextLines::new(utf8(input).map_err(io)?)?;
+    let (input, carried) = utf8(input).and_then(as_table).map_err(io)?;
+    let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
+    if let Some(carried) = &carried {
+        layout.take_names(&carried.borrow().names);
+    }
     if layout.first.is_none() {
         // Before anything is asked of its columns.
         return Err(CaptureError::Empty);
@@ -173,6 +178,9 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     let grouped = reader.grouped();
     reader.sensors.take().map_or(Ok(()), Sensors::one)?;
     found.notes.extend(grouped);
+    found
+        .notes
+        .extend(carried.iter().flat_map(|carried| carried.borrow().notes()));
     if let Some(first) = again.first() {
         found.notes.push(format!(
             "the names of the columns stand again {} x, first in line {first}, as where files were put end to end: the rows are read on",

@@ -4,8 +4,9 @@ use super::CaptureError;
 use super::cells::{Cells, is_missing};
 use super::columns::{Column, Role};
 use super::error::brief;
+use super::propose::date_of;
 use super::several::Sensors;
-use super::time::Clock;
+use super::time::{Clock, is_date, is_of_day};
 
 impl Role {
     /// Whether a column of this kind can have such a cell.
@@ -27,12 +28,20 @@ impl Role {
 const DECIMAL_COMMAS: &str =
     "if its numbers have decimal commas, write the table with `;` or tabs between the cells; ";
 
+/// A time of day with the date that stands in a column of its own, where they make one.
+fn dated(date: &str, time: &str) -> Option<String> {
+    let both = is_of_day(time).then(|| format!("{date} {time}"))?;
+    is_date(&both).then_some(both)
+}
+
 /// Reads the rows of a text.
 pub(super) struct RowReader<'a> {
     columns: &'a [Column],
     width: usize,
     cells: Cells,
     clocks: Vec<Clock>,
+    /// Where the dates of times of day stand.
+    dates: Vec<Option<usize>>,
     /// Of the last row.
     pub values: Vec<f64>,
     /// All numbers of a plain row.
@@ -49,7 +58,12 @@ impl<'a> RowReader<'a> {
             Role::Time { scale } => Clock::new(scale),
             _ => Clock::new(1.0),
         };
+        let date = |column: &Column| match column.role {
+            Role::Time { .. } => date_of(names, column.at),
+            _ => None,
+        };
         Self {
+            dates: columns.iter().map(date).collect(),
             columns,
             width: names.len(),
             cells,
@@ -134,6 +148,9 @@ impl<'a> RowReader<'a> {
             let read = match (cell, &column.role) {
                 (cell, _) if is_measured && is_missing(cell) => Some(f64::NAN),
                 (_, Role::Time { .. }) => {
+                    let date = self.dates[k].and_then(|at| row.get(at));
+                    let dated = date.and_then(|date| dated(date, cell));
+                    let cell = dated.as_deref().unwrap_or(cell);
                     let cells = &mut self.cells;
                     self.clocks[k].seconds(cell, |cell| cells.number(cell))
                 }

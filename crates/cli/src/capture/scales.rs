@@ -58,6 +58,7 @@ impl Scales {
         text: &mut TextLines<impl BufRead>,
     ) -> Result<Self, CaptureError> {
         let mut found = Self::default();
+        found.notes.extend(of_gcsv(layout));
         let said = layout.said.clone();
         let lines: Vec<&(u64, String)> = said.iter().filter(|(_, line)| is_of(line)).collect();
         if lines.is_empty() || layout.numbered || layout.lines.get("format").is_some() {
@@ -142,6 +143,38 @@ impl Scales {
             error => error,
         }
     }
+}
+
+/// How a log for stabilizing videos begins (gcsv): its lines `tscale`, `gscale` and `ascale` say what a number of its columns
+/// is, in s, rad/s and g.
+const GCSV: &str = "GYROFLOW IMU LOG";
+
+/// Takes the scales of such a log, and tells so.
+fn of_gcsv(layout: &mut Layout) -> Option<String> {
+    let mut lines = layout.said.iter().map(|(_, line)| line.trim());
+    lines.find(|line| *line == GCSV)?;
+    let scale = |key: &str| {
+        let lines = layout.said.iter();
+        let mut of = lines.filter_map(|(_, line)| line.trim().strip_prefix(key)?.strip_prefix(','));
+        let scale: f64 = of.next()?.trim().parse().ok()?;
+        (scale > 0.0 && scale.is_finite()).then_some(scale)
+    };
+    let mut taken = Vec::new();
+    for (key, unit, names) in [
+        ("tscale", "s", &["t"][..]),
+        ("gscale", "rad/s", &["gx", "gy", "gz"]),
+        ("ascale", "g", &["ax", "ay", "az"]),
+    ] {
+        let Some(scale) = scale(key) else { continue };
+        let columns = layout.names.iter().zip(&mut layout.units);
+        let of_columns = columns.filter(|(name, _)| names.contains(&name.as_str()));
+        for (_, own) in of_columns {
+            *own = Some(format!("{scale}{unit}"));
+        }
+        taken.push(format!("{key} {scale} {unit}"));
+    }
+    let taken = taken.join(", ");
+    (!taken.is_empty()).then(|| format!("the scales are those of the file: {taken}"))
 }
 
 /// Whether a line says something of a sensor's scale.

@@ -10,7 +10,7 @@ use super::{CaptureError, unpack};
 /// How gzip begins.
 const GZIP: &[u8] = &[0x1f, 0x8b];
 /// No row of numbers is longer.
-const LONGEST_LINE: u64 = 1 << 20;
+pub(super) const LONGEST_LINE: u64 = 1 << 20;
 /// Bytes without a row of numbers, empty lines and comments, after which there is none: packed, a gigabyte of them is small.
 const NO_ROW: u64 = 1 << 24;
 
@@ -86,8 +86,8 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
     if let Some((_, what, help)) = NO_TEXT.iter().find(|(magic, ..)| start.starts_with(magic)) {
         return Some((what, help));
     }
-    const AS_CSV: &str =
-        "save the readings as CSV, a line of column names and then a row for each sample";
+    const AS_CSV: &str = "save the readings as CSV, a line of column names and then a row for each sample; of an array of \
+                          objects `jq -c '.[]' FILE > lines.json` makes lines, which are read";
     let known: [(&[u8], _); 4] = [
         (b"[{", "JSON"),
         (b"<?xml", "XML"),
@@ -115,7 +115,10 @@ fn no_text(start: &[u8]) -> Option<(&'static str, &'static str)> {
             ));
         }
         if object.starts_with(b"\"") {
-            return Some(("JSON", AS_CSV));
+            return Some((
+                "JSON, and not an object with the same keys in each line",
+                AS_CSV,
+            ));
         }
     }
     if let Some((_, what)) = known.iter().find(|(how, _)| begins.starts_with(how)) {

@@ -80,6 +80,11 @@ pub(super) fn is_date(cell: &str) -> bool {
     is_dated || Dated::of(cell).is_some()
 }
 
+/// Whether a cell is a time of day without a date.
+pub(super) fn is_of_day(cell: &str) -> bool {
+    of_day(cell).is_some()
+}
+
 /// A time of day without a date, since midnight.
 fn of_day(cell: &str) -> Option<i64> {
     cell.contains(':').then(|| since_midnight(cell))?
@@ -129,7 +134,7 @@ fn nanoseconds(cell: &str) -> Option<i64> {
         return time.timestamp_nanos_opt();
     }
     let (date, time) = apart(cell)?;
-    let date = ["%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y"]
+    let date = ["%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d-%b-%Y"]
         .iter()
         .find_map(|form| NaiveDate::parse_from_str(date, form).ok())?;
     let midnight = date.and_time(NaiveTime::MIN).and_utc();
@@ -227,6 +232,7 @@ mod tests {
             ["2014-06-30T23:59:59.5", "2014-07-01T00:00:00"],
             ["2014/06/30 23:59:59.5", "2014/07/01 00:00:00"],
             ["30.06.2014 23:59:59,5", "01.07.2014 00:00:00,0"],
+            ["30-Jun-2014 23:59:59.5", "01-Jul-2014 00:00:00.0"],
             ["19:02:59.5", "19:03:00"],
             ["23:59:59.5", "00:00:00.0"],
             ["19:02:59:500", "19:03:00:000"],

@@ -104,8 +104,11 @@ impl Meaning {
         let is_called_time = is_time_of || TIME.iter().any(|s| first.starts_with(s));
         let kind = if unit_is_of(What::Channel(Quantity::Temp)) {
             Kind::Temp
-        } else if is_called_time && unit_is_of(What::Time) {
+        } else if (is_called_time && unit_is_of(What::Time)) || is(&["timestamp"]) {
             Kind::Time
+        } else if is(&["user"]) && is(&["acc"]) {
+            // What a phone has left of its acceleration without gravity.
+            Kind::Unknown
         } else if is(&["mag", "quat", "orient", "gravity", "euler", "tick"]) {
             Kind::Unknown
         } else if is(&[
@@ -122,10 +125,11 @@ impl Meaning {
         ]) || letters(&["g", "w", "gx", "gy", "gz", "wx", "wy", "wz"])
         {
             Kind::Gyro
-        } else if is(&["acc", "linear", "beschl", "加速度"]) || letters(&["a", "ax", "ay", "az"])
+        } else if is(&["acc", "linear", "beschl", "加速度"])
+            || letters(&["a", "ac", "ax", "ay", "az"])
         {
             Kind::Acc
-        } else if is(&["temp", "温度"]) && !TEMPS.contains(&first) {
+        } else if (is(&["temp", "温度"]) || letters(&["tmp"])) && !TEMPS.contains(&first) {
             Kind::Temp
         } else if is_called_time
             || first == "t"
@@ -155,8 +159,12 @@ impl Meaning {
 }
 
 /// What a time may be of.
-const CLOCKS: [&str; 11] = [
+const CLOCKS: [&str; 15] = [
     "elapsed",
+    "rtc",
+    "chip",
+    "host",
+    "board",
     "sample",
     "system",
     "sys",

@@ -15,6 +15,8 @@ use super::{Guess, alias, guess};
 const LONG: usize = 80;
 /// Stands where a unit has to be put in: no unit is called so, and a mapping with it is refused.
 const UNIT: &str = "UNIT";
+/// The time in files of Xsens and Movella, whose programs have two units for the same names.
+const OF_XSENS: &str = "SampleTimeFine";
 /// Stands where nothing says which column is meant.
 const COLUMN: &str = "COLUMN";
 
@@ -171,6 +173,12 @@ fn line_of(
         line += " --rate HZ";
     }
     hints.extend(hints_of(guess, numbered, &column));
+    if open.contains(&"gyro") && names.iter().any(|name| name == OF_XSENS) {
+        hints.push(
+            "with these names MT Manager writes rad/s and `time=0.1ms`, the app of the DOT deg/s and `time=us`"
+                .to_owned(),
+        );
+    }
     Proposal {
         line,
         open,
@@ -253,11 +261,14 @@ pub(in crate::capture) fn proposed(
         twice,
         hints,
     } = {
-        let found = guess(said.names, said.numbered, seen);
-        let (found, given) = match lacks_one {
-            true => (asked(found, said, mapping, knows_rate), &mapping.units[..]),
-            false => (found, &[][..]),
-        };
+        let mut found = guess(said.names, said.numbered, seen);
+        if lacks_one {
+            found = asked(found, said, mapping, knows_rate);
+        }
+        // What was given is not asked for again.
+        let given = &mapping.units[..];
+        let is_open = |key: &str| !given.iter().any(|(known, _)| known == key);
+        found.units.retain(|(key, _)| is_open(key));
         let numbered = said.numbered;
         line_of(&found, given, said.names, said.units, numbered, knows_rate)
     };
