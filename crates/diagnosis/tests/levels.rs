@@ -37,8 +37,20 @@ fn answer_with(
     added: &[f64],
     seed: u64,
 ) -> Result<Diagnosed, Box<dyn std::error::Error>> {
+    answer_in(&[], effects, added, seed)
+}
+
+/// The same in a world that is stated.
+fn answer_in(
+    world: &[(&str, f64)],
+    effects: Vec<EffectModel>,
+    added: &[f64],
+    seed: u64,
+) -> Result<Diagnosed, Box<dyn std::error::Error>> {
     let mut model = ModelFile::paper();
     model.effects = effects;
+    let world = world.iter().map(|(name, v)| ((*name).to_owned(), *v));
+    model.excitation = world.collect();
     for channel in &mut model.channels {
         let walk = Parameter::exact(1e-3, "deg/s/sqrt(s)");
         channel.baseline.insert("rate_random_walk".to_owned(), walk);
@@ -150,6 +162,35 @@ fn two_levels_keep_their_name_beside_a_vibration_elsewhere_that_has_none() -> Te
         named += usize::from(found(&d, "telegraph", "half_height").is_some());
     }
     assert!(named >= FEWEST, "{named} of {DRAWS}");
+    Ok(())
+}
+
+/// What departures from the dependence on a temperature may explain of a spectrum is asked of two levels as of any noise: they are no
+/// remainder because the temperature moves the bias ten times as far.
+#[test]
+fn two_levels_keep_their_name_beside_a_strong_dependence_on_the_temperature() -> Tested {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(20_261_129);
+    let mut misses = vec![];
+    for seed in 0..DRAWS {
+        let (levels, dwell) = telegraph(&mut rng, [0.2, 0.4]);
+        let slope = Uniform::new(0.1, 0.6)?.sample(&mut rng);
+        let slope = ("slope", slope, "deg/s/degC");
+        let d = answer_in(
+            &[("heater_degc", 6.0)],
+            vec![levels, stated("temperature", "gyro_x", &[slope])],
+            &[],
+            1000 + seed,
+        )?;
+        let told: Vec<&str> = (d.diagnosis.findings.iter().map(|f| f.cause.as_str())).collect();
+        if !["temperature", "telegraph"]
+            .iter()
+            .all(|c| told.contains(c))
+        {
+            misses.push((slope.1, dwell, told.join(", ")));
+        }
+    }
+    let named = DRAWS as usize - misses.len();
+    assert!(named >= FEWEST, "{named}: {misses:?}");
     Ok(())
 }
 

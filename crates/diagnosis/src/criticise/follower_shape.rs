@@ -130,11 +130,8 @@ fn in_proportion(state: &State, term: &Term) -> Option<(&'static str, Outcome)> 
 }
 
 /// Whether a term keeps most of what it explains, and enough to be named, where an effect beside it that follows a channel
-/// may depart from its shape. One that a contest weighed by other means does not say.
+/// may depart from its shape. Of one that a contest weighed by other means, most of what its spectrum explains.
 pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effect: &str) -> bool {
-    if term.stated.is_some() {
-        return false;
-    }
     let of_it = state.terms.iter().filter(|t| t.effect.id() == effect);
     let mut names: Vec<&str> = of_it.filter_map(|t| search.followed(t)).collect();
     names.dedup();
@@ -145,23 +142,38 @@ pub(crate) fn holds_beside(search: &Search<'_>, state: &State, term: &Term, effe
         .flat_map(|d| d.columns);
     let width = search.panel.width();
     let added = search.panel.add_all(departures);
-    let likelihood = |left_out: Option<&Term>| {
-        let mut noise = Noise::new(state.noise.log_walk);
-        let mut fitted = state.noise.terms.iter();
-        let mut columns = added.clone();
-        for t in &state.terms {
-            let covariance = match t.form {
-                Form::Covariance(..) => fitted.next(),
-                _ => None,
-            };
-            if !left_out.is_some_and(|l| std::ptr::eq(l, t)) {
-                noise.terms.extend(covariance.cloned());
-                columns.extend(&t.columns);
-            }
-        }
-        search.panel.fit(&noise, &columns).1.log_likelihood
+    let explained = |beside: &[usize]| {
+        2.0 * (likelihood(search, state, beside, None)
+            - likelihood(search, state, beside, Some(term)))
     };
-    let lr = 2.0 * (likelihood(None) - likelihood(Some(term)));
+    let before = match term.stated {
+        Some(_) => explained(&[]),
+        None => term.lr,
+    };
+    let lr = explained(&added);
     search.panel.truncate(width);
-    lr > term.threshold.max(0.5 * term.lr)
+    lr > term.threshold.max(0.5 * before)
+}
+
+/// Log likelihood of a state beside some columns, without a term where one is `left_out`.
+fn likelihood(
+    search: &Search<'_>,
+    state: &State,
+    beside: &[usize],
+    left_out: Option<&Term>,
+) -> f64 {
+    let mut noise = Noise::new(state.noise.log_walk);
+    let mut fitted = state.noise.terms.iter();
+    let mut columns = beside.to_vec();
+    for t in &state.terms {
+        let covariance = match t.form {
+            Form::Covariance(..) => fitted.next(),
+            _ => None,
+        };
+        if !left_out.is_some_and(|l| std::ptr::eq(l, t)) {
+            noise.terms.extend(covariance.cloned());
+            columns.extend(&t.columns);
+        }
+    }
+    search.panel.fit(&noise, &columns).1.log_likelihood
 }
