@@ -294,18 +294,16 @@ fn in_shorter_blocks(all: &[Heard], asked: &[f64], mut best: Told, mut count: us
 fn rotor(all: &[Heard], seed: Seed) -> Option<Rotor> {
     let n = all.first()?.coefficients.len();
     let multiples: Vec<f64> = ratios().collect();
-    let mut found = told(all, &[1.0], &seed.lead, blocks_for(&seed.lead, 1.0, n))?;
-    for round in 1..ROUNDS {
+    let mut count = blocks_for(&seed.lead, 1.0, n);
+    let mut found = told(all, &[1.0], &seed.lead, count)?;
+    for _ in 1..ROUNDS {
         let widest = found.parts.iter().map(|p| p.ratio).fold(1.0, f64::max);
-        let count = blocks_for(&found.lead, widest, n);
+        count = blocks_for(&found.lead, widest, n);
         found = told(all, &multiples, &found.lead, count)?;
-        if round + 1 == ROUNDS {
-            found = in_shorter_blocks(all, &multiples, found, count);
-        }
     }
     let Told {
         parts, mut lead, ..
-    } = found;
+    } = in_shorter_blocks(all, &multiples, found, count);
     let shared = parts.iter().any(|p| p.heard != parts[0].heard);
     Arc::make_mut(&mut lead.path).shared = shared;
     let is_alone = parts.len() == 1;
