@@ -191,6 +191,7 @@ impl Meter for Crates {
         match self.count {
             0 if self.last.is_empty() => "starting".to_owned(),
             0 => self.last.clone(),
+            1 => format!("1 crate so far, now {}", self.last),
             count => format!("{count} crates so far, now {}", self.last),
         }
     }
