@@ -358,6 +358,12 @@ fn other_rates_and_lengths_work_and_too_short_says_what_it_takes() {
         ),
         "{error}"
     );
+    // 30 s by a clock that is off by what a sensor's own may be, and by more.
+    for (rate, is_enough) in [(100.9, true), (102.0, false)] {
+        let record = model::simulate(&ModelFile::paper(), 3000.0 / rate, rate, 4).expect("a run");
+        let told = diagnose(&record, &DiagnoseOptions::default());
+        assert_eq!(told.is_ok(), is_enough, "{rate} Hz");
+    }
 }
 
 #[test]

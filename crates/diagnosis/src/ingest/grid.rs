@@ -31,7 +31,7 @@ use signals::{of_gyro, other};
 pub const LEAST_SAMPLES: usize = 600;
 /// Least length, s.
 pub const LEAST_SECONDS: f64 = 30.0;
-/// What a clock without a crystal is off by: that part of it may be missing of a record that was to be as long.
+/// What a sensor's own oscillator is off by (PS-MPU-6000A, 7.15: 1 % over temperature): a record may be as much shorter.
 const CLOCK: f64 = 0.01;
 /// So many readings show their step.
 fn few(values: &[f64]) -> &[f64] {
