@@ -13,6 +13,7 @@ pub(crate) mod envelope;
 mod harmonic;
 pub(crate) mod impute;
 pub(crate) mod power_law;
+mod process_for_walk;
 mod process_pairs;
 mod refine;
 mod rivals;
@@ -207,7 +208,7 @@ impl<'a> Search<'a> {
     /// Search from the baseline.
     #[must_use]
     pub fn ascend(&self, baseline: State) -> State {
-        self.pair_up(self.climb(baseline))
+        self.or_process_for_walk(self.pair_up(self.climb(baseline)))
     }
 
     /// The end of a search, once whole explanations have been compared: what is told beside the terms, and their rivals.

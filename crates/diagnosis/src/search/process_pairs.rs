@@ -21,7 +21,7 @@ type Freedom = (usize, usize);
 type Process<'a> = (usize, &'a Arc<dyn Covariance>);
 
 impl Search<'_> {
-    fn processes(&self) -> Vec<Process<'_>> {
+    pub(super) fn processes(&self) -> Vec<Process<'_>> {
         let all = self.candidates.iter().enumerate();
         all.filter_map(|(i, c)| match &c.hypothesis {
             Hypothesis::Covariance(p) if !p.is_peak() && !c.is_nameless() => Some((i, p)),
@@ -30,7 +30,7 @@ impl Search<'_> {
         .collect()
     }
 
-    fn process(&self, (i, c): Process<'_>, theta: Vec<f64>) -> Term {
+    pub(super) fn process(&self, (i, c): Process<'_>, theta: Vec<f64>) -> Term {
         let form = Form::Covariance(Arc::clone(c), theta);
         let limit = threshold::covariance(c.dimensions());
         Term::new(self.candidates[i].effect, i, form, limit)
