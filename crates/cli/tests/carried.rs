@@ -71,7 +71,9 @@ fn sentences_of_an_instrument_say_their_columns_and_a_damaged_one_keeps_its_plac
     assert!(without.header.rate_hz.is_none());
     // A program may have put the time before each.
     let timed = rows(60, |k| format!("{:.2},{}", 1.7e9 + 0.02 * k as f64, ymr(k)));
+    let timed = timed.replacen("+00.100", "+00.101", 1);
     let record = read(&timed, "", None).expect("a record with times");
+    assert!(record.channel("gyro_x").expect("a gyro").values[0].is_nan());
     assert!((record.header.rate_hz.expect("a rate") - 50.0).abs() < 1e-3);
 }
 
@@ -344,4 +346,105 @@ fn two_programs_of_one_maker_have_two_units_and_the_question_says_so() {
     );
     let said = refusal(&text);
     assert!(said.contains("DOT") && said.contains("gyro=UNIT"), "{said}");
+}
+
+/// NovAtel's CRC of a body: that of Ethernet, from 0 on and not inverted.
+fn novatel(body: &str) -> String {
+    let crc = body.bytes().fold(0u32, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
+        })
+    });
+    format!("{body}*{crc:08x}")
+}
+
+/// Extended logs of a type of IMU, at 100 Hz over the end of a week; at rest, with this velocity along z in a sample.
+fn raw_imu(imu: u8, velocity: i64) -> String {
+    rows(60, |k| {
+        let cs = 60_479_970 + k as i64;
+        let (week, s) = (2209 + cs / 60_480_000, (cs % 60_480_000) as f64 / 100.0);
+        let info = if k == 9 { "02" } else { "00" };
+        let log = format!(
+            "RAWIMUSXA,{week},{s:.3};{info},{imu},{week},{s:.9},00801503,{velocity},-300,200,3,-{},{}",
+            k + 1,
+            10 * k
+        );
+        let other = novatel("INSPVASA,1,2.0;1,2.0,3,4,5*").replace('*', "-");
+        match k {
+            7 => format!("%{}", novatel(&log).replace(",200,", ",201,")),
+            30 => format!("%{}\n%{other}\n#{other}", novatel(&log)),
+            _ => format!("%{}", novatel(&log)),
+        }
+    })
+}
+
+#[test]
+fn a_log_of_a_receiver_is_read_by_the_type_of_its_imu() {
+    // The HG1700-AG58 of the test of the checksum: a count is 2^-33 rad and 2^-27 ft/s, 100 times a second.
+    let text = raw_imu(11, 43_110_635);
+    let record = read(&text, "", None).expect("a record");
+    let (gyro, acc) = (100.0 * 2f64.powi(-33), 100.0 * 0.3048 * 2f64.powi(-27));
+    is_at(&record, "gyro_x", 19, (200.0 * gyro).to_degrees());
+    // The y axis stands turned round.
+    is_at(&record, "gyro_y", 19, (21.0 * gyro).to_degrees());
+    is_at(&record, "acc_y", 20, 300.0 * acc);
+    is_at(&record, "acc_z", 20, 9.790_153_464_674_95);
+    assert!((record.header.rate_hz.expect("a rate") - 100.0).abs() < 1e-3);
+    let gyro = &record.channel("gyro_x").expect("a gyro").values;
+    let missing: Vec<usize> = (0..gyro.len()).filter(|k| gyro[*k].is_nan()).collect();
+    // A time behind a wrong checksum is none; readings that are encrypted are none.
+    assert_eq!((gyro.len(), missing), (59, vec![8]));
+    let said = record.notes.join("\n");
+    assert!(
+        said.contains("HG1700-AG58") && said.contains("which are not read: 2"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_log_of_a_receiver_whose_scale_is_not_certain_asks_for_it() {
+    // Another type; a type of another rate; a receiver of another maker, whose type is not what it says.
+    let short = rows(60, |k| {
+        let s = 100.0 + 0.01 * k as f64;
+        format!(
+            "%{}",
+            novatel(&format!(
+                "RAWIMUSA,2209,{s:.3};2209,{s:.9},00801503,43110635,-300,200,3,-5,{k}"
+            ))
+        )
+    });
+    for text in [
+        raw_imu(99, 43_110_635),
+        raw_imu(8, 1),
+        raw_imu(58, 43_110_635),
+        short.clone(),
+    ] {
+        let said = refusal(&text);
+        assert!(
+            said.contains("gyro=UNIT") && said.contains("Scale Factors"),
+            "{said}"
+        );
+    }
+    let record = read(&short, "gyro=0.5rad/s,acc=0.5m/s2", None).expect("a record");
+    is_at(&record, "gyro_x", 20, 10f64.to_degrees());
+    is_at(&record, "acc_y", 20, 150.0);
+}
+
+#[test]
+fn lines_of_a_razor_are_no_comments() {
+    let text = rows(60, |k| {
+        format!("#A-R=-12.00,3.00,250.00\n#M-R=100.00,-20.00,300.00\n#G-R=-41.00,98.00,{k}.00")
+    });
+    let said = refusal(&text);
+    assert!(
+        said.contains("14.375") && said.contains("gyro=UNIT"),
+        "{said}"
+    );
+    for head in ["", "#SYNCH00\n", "#SYNCH00\n#YPR=1.00,2.00,3.00\n"] {
+        let text = format!("{head}{text}");
+        let record =
+            read(&text, "gyro=0.0695652deg/s,acc=0.00390625g", Some(50.0)).expect("a record");
+        is_at(&record, "gyro_z", 20, 20.0 * 0.069_565_2);
+        is_at(&record, "acc_x", 20, -12.0 * 0.003_906_25 * 9.80665);
+    }
 }

@@ -1,6 +1,7 @@
-//! Rows that carry what they are, made rows of a table on the way: sentences (`$VNYMR,...*5C`), readings behind their names
-//! (`ax:0.1,ay:0.2`), an object of JSON a line.
+//! Rows that carry what they are, made rows of a table on the way: sentences (`$VNYMR,...*5C`, `%RAWIMUSA,...*c01b540c`),
+//! readings behind their names (`ax:0.1,ay:0.2`, `#A-R=1,2,3`), an object of JSON a line.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::io::{BufRead, Cursor, Read, Result};
 use std::rc::Rc;
@@ -10,12 +11,15 @@ use super::stream::LONGEST_LINE;
 mod labels;
 mod messages;
 mod objects;
+pub(super) mod raw_imu;
+pub(super) mod razor;
 mod received;
 mod sentences;
 
 use labels::{BETWEEN, Cycle, Labels};
 use messages::Messages;
 use objects::Objects;
+use raw_imu::RawImu;
 use received::Received;
 use sentences::Sentences;
 
@@ -29,7 +33,7 @@ const SHOWN: usize = 3;
 enum Made {
     /// A row.
     Row,
-    /// A row of which nothing can be read: it keeps its place.
+    /// A row of which nothing can be read: it keeps its place, by its time where it has one that can be believed.
     Damaged,
     /// A line of something else.
     Other,
@@ -38,6 +42,7 @@ enum Made {
 /// How the rows carry what they are.
 enum Form {
     Sentences(Sentences),
+    RawImu(RawImu),
     Labels(Labels),
     Objects(Objects),
     Messages(Messages),
@@ -58,6 +63,7 @@ impl Form {
     fn names(&self) -> &[String] {
         match self {
             Self::Sentences(form) => &form.names,
+            Self::RawImu(form) => &form.names,
             Self::Labels(form) => &form.names,
             Self::Objects(form) => &form.names,
             Self::Messages(form) => &form.names,
@@ -68,6 +74,7 @@ impl Form {
     fn what(&self) -> String {
         match self {
             Self::Sentences(form) => format!("a sentence `${}`", form.tag),
+            Self::RawImu(form) => format!("a log `{}` of NovAtel; {}", form.tag, form.told),
             Self::Labels(_) => "readings behind their names".to_owned(),
             Self::Objects(_) => "an object of JSON a line".to_owned(),
             Self::Messages(_) => "a message sensor_msgs/Imu of ROS 2, without names".to_owned(),
@@ -75,14 +82,30 @@ impl Form {
         }
     }
 
+    /// Units of the columns that their names do not say.
+    fn units(&self) -> &[Option<String>] {
+        match self {
+            Self::RawImu(form) => &form.units,
+            _ => &[],
+        }
+    }
+
+    /// Whether the first cell of a row is its time.
+    fn has_time(&self) -> bool {
+        self.names()
+            .first()
+            .is_some_and(|name| name.starts_with("time"))
+    }
+
     /// Whether lines of something else may stand between the rows: an instrument sends several sentences.
     fn is_mixed(&self) -> bool {
-        matches!(self, Self::Sentences(_))
+        matches!(self, Self::Sentences(_) | Self::RawImu(_))
     }
 
     fn row(&self, line: &str, row: &mut String) -> Made {
         match self {
             Self::Sentences(form) => form.row(line, row),
+            Self::RawImu(form) => form.row(line, row),
             Self::Labels(form) => form.row(line, row),
             Self::Objects(form) => form.row(line, row),
             Self::Messages(form) => form.row(line, row),
@@ -96,9 +119,12 @@ impl Form {
 pub(super) struct Carried {
     /// Names of the columns.
     pub names: Vec<String>,
+    /// Their units where the names do not say them.
+    pub units: Vec<Option<String>>,
     what: String,
     rows: usize,
     damaged: usize,
+    is_raw_imu: bool,
     others: usize,
 }
 
@@ -113,8 +139,15 @@ impl Carried {
             ));
         }
         if self.damaged > 0 {
+            let (of, then) = match self.is_raw_imu {
+                true => (
+                    " (they are a gap), or which tell of an error of the IMU or are encrypted (they have no readings)",
+                    "",
+                ),
+                false => ("", "; they keep their places, without readings"),
+            };
             notes.push(format!(
-                "rows whose checksum or length is wrong: {}; they keep their places, without readings",
+                "rows whose checksum or length is wrong{of}: {}{then}",
                 self.damaged
             ));
         }
@@ -139,14 +172,18 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
         // The last one goes on.
         lines.pop();
     }
+    let raw_imu = RawImu::of(&lines).map(Form::RawImu);
+    let unmarked: Vec<Cow<'_, str>> = lines.iter().map(|line| razor::unmarked(line)).collect();
+    let mut lines: Vec<&str> = unmarked.iter().map(AsRef::as_ref).collect();
     lines.retain(|line| !line.is_empty() && !line.starts_with(['#', '%']));
-    let (form, cycle) = match Form::of(&lines) {
+    let (form, cycle) = match raw_imu.or_else(|| Form::of(&lines)) {
         Some(form) => (Some(form), None),
         None => Labels::over_lines(&lines)
             .map(|(labels, cycle)| (Form::Labels(labels), cycle))
             .unzip(),
     };
     drop(lines);
+    drop(unmarked);
     drop(text);
     let input = Cursor::new(head).chain(input);
     let Some(form) = form else {
@@ -154,7 +191,9 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
     };
     let carried = Rc::new(RefCell::new(Carried {
         names: form.names().to_vec(),
+        units: form.units().to_vec(),
         what: form.what(),
+        is_raw_imu: matches!(form, Form::RawImu(_)),
         ..Carried::default()
     }));
     let told = Rc::clone(&carried);
@@ -197,7 +236,8 @@ impl<R: BufRead> Rows<R> {
         let line = String::from_utf8_lossy(&self.line);
         let mut row = String::new();
         let mut told = self.told.borrow_mut();
-        let mut line = line.trim();
+        let line = razor::unmarked(line.trim());
+        let mut line = line.as_ref();
         let joined;
         if let Some(cycle) = &self.cycle {
             if cycle.is_first(line) {
@@ -223,10 +263,12 @@ impl<R: BufRead> Rows<R> {
             }
             Made::Damaged => {
                 told.damaged += 1;
-                let empty = ",".repeat(told.names.len().saturating_sub(1));
-                self.made.extend_from_slice(empty.as_bytes());
+                if !row.is_empty() || !self.form.has_time() {
+                    row.push_str(&",".repeat(told.names.len().saturating_sub(1)));
+                    self.made.extend_from_slice(row.as_bytes());
+                }
             }
-            Made::Other if line.is_empty() || line.starts_with('#') => {
+            Made::Other if line.is_empty() || line.starts_with('#') && !self.form.is_mixed() => {
                 self.made.extend_from_slice(line.as_bytes());
             }
             Made::Other if told.rows == 0 || self.form.is_mixed() => told.others += 1,

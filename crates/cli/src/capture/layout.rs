@@ -136,13 +136,15 @@ impl Layout {
         }
     }
 
-    /// Takes the names that the rows carried.
-    pub fn take_names(&mut self, names: &[String]) {
+    /// Takes the names that the rows carried, and the units of those that do not say them.
+    pub fn take_names(&mut self, names: &[String], known: &[Option<String>]) {
         if names.len() == self.names.len() {
             self.names = names.to_vec();
             self.numbered = false;
             let units = names.iter().map(|name| in_brackets(name).1);
             self.units = units.map(|unit| unit.map(str::to_owned)).collect();
+            let known = self.units.iter_mut().zip(known);
+            known.for_each(|(own, known)| *own = known.clone().or(own.take()));
         }
     }
 

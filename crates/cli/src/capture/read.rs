@@ -110,7 +110,8 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
     if let Some(carried) = &carried {
-        layout.take_names(&carried.borrow().names);
+        let carried = carried.borrow();
+        layout.take_names(&carried.names, &carried.units);
     }
     if layout.first.is_none() {
         // Before anything is asked of its columns.

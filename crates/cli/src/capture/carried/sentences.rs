@@ -51,12 +51,14 @@ impl Sentences {
         let (time, sentence) = behind_time(line);
         let time = time.filter(|_| self.has_time);
         let Some(body) = checked(sentence) else {
+            row.push_str(time.unwrap_or_default());
             return Made::Damaged;
         };
         let cells = time
             .into_iter()
             .chain(body.split(',').skip(1).map(str::trim));
         if cells.clone().count() != self.names.len() {
+            row.push_str(time.unwrap_or_default());
             return Made::Damaged;
         }
         write_cells(cells, row);

@@ -3,6 +3,7 @@
 use crate::text::shell_word;
 
 use super::super::angle::Angle;
+use super::super::carried::{raw_imu, razor};
 use super::super::columns::Said;
 use super::super::error::{brief, brief_list};
 use super::super::mapped::place;
@@ -173,11 +174,8 @@ fn line_of(
         line += " --rate HZ";
     }
     hints.extend(hints_of(guess, numbered, &column));
-    if open.contains(&"gyro") && names.iter().any(|name| name == OF_XSENS) {
-        hints.push(
-            "with these names MT Manager writes rad/s and `time=0.1ms`, the app of the DOT deg/s and `time=us`"
-                .to_owned(),
-        );
+    if open.contains(&"gyro") {
+        hints.extend(hints_of_unit(names));
     }
     Proposal {
         line,
@@ -185,6 +183,32 @@ fn line_of(
         twice,
         hints,
     }
+}
+
+/// Names of what is in counts whose size the reader has to look up, and where.
+const OF_COUNTS: [(&str, &str); 2] = [
+    (
+        raw_imu::GYRO,
+        "a count is an increment over one sample of the IMU, and its size depends on the type of the IMU: take the scale from \
+         the table `Raw IMU Scale Factors` of the receiver's manual, times the samples a second that the manual gives for the \
+         type (an LN200: 2^-19 rad times 200 Hz, `gyro=0.00038147rad/s`; 2^-14 m/s times 200 Hz, `acc=0.012207m/s2`)",
+    ),
+    (
+        razor::GYRO,
+        "what a count is depends on the board: with the ITG-3200 `gyro=0.0695652deg/s` (14.375 counts a deg/s), with the \
+         ADXL345 `acc=0.00390625g` (256 counts a g); others by their data sheets",
+    ),
+];
+
+/// What is known of the unit of a gyro by the names of the columns.
+fn hints_of_unit(names: &[String]) -> impl Iterator<Item = String> {
+    let of_xsens = names.iter().any(|name| name == OF_XSENS).then_some(
+        "with these names MT Manager writes rad/s and `time=0.1ms`, the app of the DOT deg/s and `time=us`",
+    );
+    let is_there = |start: &str| names.iter().any(|name| name.starts_with(start));
+    let of_counts = OF_COUNTS.iter().filter(move |(start, _)| is_there(start));
+    let of_counts = of_counts.map(|(_, hint)| *hint);
+    of_xsens.into_iter().chain(of_counts).map(str::to_owned)
 }
 
 /// What else has to be known of the columns.
