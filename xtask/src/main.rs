@@ -10,6 +10,7 @@ mod image;
 mod mutants;
 mod page;
 mod peers;
+mod reproduce;
 mod size;
 mod soak;
 mod step;
@@ -38,7 +39,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   answers  --write [DIR] keeps what the engine says of some 400 records of every kind; --compare [DIR] names by record and
            path what has moved since: before and after a change of the engine's code that is to move nothing
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
-  image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex}
+  image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex};
+           --check-reproducible builds it in another folder too and compares
   size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
   mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
            --seed N and --count N draw, --minutes N bounds, --write keeps docs/mutants.txt, --registers plants those that only the image has
@@ -94,9 +96,16 @@ fn main() -> ExitCode {
         },
         Some("check") => suite::suite(&root, Extent::Everyday),
         Some("demo") => demo::demo(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
-        Some("image") => build_image(&root, &mut Pace::Rarer(0)).map(|complaints| {
-            complaints.iter().for_each(|line| eprintln!("{line}"));
-        }),
+        Some("image") => match std::env::args().nth(2).as_deref() {
+            None => build_image(&root, &mut Pace::Rarer(0)).map(|complaints| {
+                complaints.iter().for_each(|line| eprintln!("{line}"));
+            }),
+            Some("--check-reproducible") => reproduce::check(&root),
+            Some(_) => Err(Failure::new(
+                "`cargo xtask image` takes --check-reproducible or nothing",
+                "cargo xtask image",
+            )),
+        },
         Some("campaign") => campaign::measure(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("answers") => answers::freeze(&root, &std::env::args().skip(2).collect::<Vec<_>>()),
         Some("effects") => effects::page(&root, &std::env::args().skip(2).collect::<Vec<_>>()),

@@ -5,7 +5,7 @@
 mod known;
 mod list;
 mod registers;
-mod tree;
+pub mod tree;
 
 use std::path::Path;
 use std::time::Instant;
