@@ -31,7 +31,7 @@ pub fn check(root: &Path) -> Result<(), Failure> {
         }
         Some(line) => Err(Failure::new(
             &format!("the image depends on its folder: line {line} of firmware.hex differs"),
-            "what the compiler was told of paths is in the image: `file!()`, panics, or an order by a hash of the path",
+            "paths are in the image (`file!()`, panics), or debug information, which they make longer, moves what `--relax` takes out",
         )),
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use crate::image;
 use crate::page;
+use crate::reproduce;
 use crate::step::{Crates, Failure, Pace, run, watched};
 use crate::wheel::{self, Profile};
 use crate::{cargo, say_sizes, toolchain};
@@ -42,6 +43,11 @@ pub fn suite(root: &Path, extent: Extent) -> Result<(), Failure> {
         run("format", &mut cargo(root, &["fmt", "--all", "--check"])).map(|()| String::new())
     })?;
     steps.step("image for the ATmega16", image_without_complaint)?;
+    if extent != Extent::Everyday {
+        steps.step("image from another folder", |root| {
+            reproduce::check(root).map(|()| String::new())
+        })?;
+    }
     steps.step("lints", |root| {
         let lints = [
             "clippy",
