@@ -90,6 +90,14 @@ impl Form {
         }
     }
 
+    /// What makes a row damaged beside its checksum and length, and what becomes of such rows.
+    fn of_damage(&self) -> (&'static str, &'static str) {
+        match self {
+            Self::RawImu(_) => (raw_imu::OF_DAMAGE, ""),
+            _ => ("", "; they keep their places, without readings"),
+        }
+    }
+
     /// Whether the first cell of a row is its time.
     fn has_time(&self) -> bool {
         self.names()
@@ -124,7 +132,8 @@ pub(super) struct Carried {
     what: String,
     rows: usize,
     damaged: usize,
-    is_raw_imu: bool,
+    /// What else makes a row damaged, and what becomes of it.
+    of_damage: (&'static str, &'static str),
     others: usize,
 }
 
@@ -139,16 +148,9 @@ impl Carried {
             ));
         }
         if self.damaged > 0 {
-            let (of, then) = match self.is_raw_imu {
-                true => (
-                    " (they are a gap), or which tell of an error of the IMU or are encrypted (they have no readings)",
-                    "",
-                ),
-                false => ("", "; they keep their places, without readings"),
-            };
             notes.push(format!(
-                "rows whose checksum or length is wrong{of}: {}{then}",
-                self.damaged
+                "rows whose checksum or length is wrong{}: {}{}",
+                self.of_damage.0, self.damaged, self.of_damage.1
             ));
         }
         notes
@@ -193,7 +195,7 @@ pub(super) fn as_table<'a>(mut input: impl BufRead + 'a) -> Result<Text<'a>> {
         names: form.names().to_vec(),
         units: form.units().to_vec(),
         what: form.what(),
-        is_raw_imu: matches!(form, Form::RawImu(_)),
+        of_damage: form.of_damage(),
         ..Carried::default()
     }));
     let told = Rc::clone(&carried);

@@ -65,6 +65,8 @@ const GRAVITY: std::ops::RangeInclusive<f64> = 9.0..=10.6;
 /// What the columns are called; `say` knows them by the first words.
 pub(in crate::capture) const GYRO: &str = "RAWIMU gyro";
 const ACC: &str = "RAWIMU acc";
+/// What becomes of rows that are damaged, and which other ones are without readings.
+pub(super) const OF_DAMAGE: &str = " (they are a gap), or which tell of an error of the IMU or are encrypted (they have no readings)";
 
 /// Rows of one such log.
 pub(super) struct RawImu {
