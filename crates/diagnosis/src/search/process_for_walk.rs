@@ -1,11 +1,13 @@
 //! A random walk that is there from the start stands for what is slow, whatever that is: for a process with a correlation
 //! time and a law of the temperature together, of which neither one alone does better than the walk. Where the walk is
-//! large, the search is made a second time with the process in its place.
+//! large, the search is made a second time with the process in its place, and with one law beside it.
 
-use model::effect::Covariance;
+use std::collections::HashSet;
 
-use super::Search;
-use crate::fit::channel::State;
+use model::effect::{Covariance, Hypothesis};
+
+use super::{Candidate, Search};
+use crate::fit::channel::{Form, State};
 
 /// Correlation times, samples, that a process in the place of the walk starts from: a record's length over these.
 const SPANS: [f64; 3] = [60.0, 600.0, 3000.0];
@@ -36,9 +38,27 @@ impl Search<'_> {
             self.refit(vec![self.process(process, theta)], walk + LOG_LEFT)
         };
         let best = |a: &State, b: &State| Self::total(a).total_cmp(&Self::total(b));
-        let start = SPANS.into_iter().map(in_its_place).max_by(best);
+        let alone = SPANS.into_iter().map(in_its_place).max_by(best);
+        let beside = alone.iter().flat_map(|s| self.with_one_law(s));
+        let all = beside.chain(alone.clone());
+        let start = all.max_by(best);
         let other = start.map(|s| self.pair_up(self.climb(s)));
         let better = |o: &State| Self::total(o) > Self::total(&state);
         other.filter(better).unwrap_or(state)
+    }
+
+    /// The states with one law of the mean more: of each effect the column and the shape that offer most. What a law is worth
+    /// beside a process that has taken its part too is little; it is told once both are fitted.
+    fn with_one_law(&self, state: &State) -> Vec<State> {
+        let of_mean = |c: &Candidate| {
+            use Hypothesis::{Regression, Shaped, Step};
+            matches!(c.hypothesis, Regression(_) | Shaped(_) | Step)
+        };
+        let mut offers = self.offers(state, &of_mean);
+        offers.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let mut seen = HashSet::new();
+        offers.retain(|o| seen.insert((o.effect.id(), matches!(o.form, Form::Columns))));
+        let with = |offer| self.accept(state, offer);
+        offers.into_iter().map(with).collect()
     }
 }
