@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use crate::cargo;
-use crate::step::{Failure, Pace};
+use crate::step::{Failure, Pace, commit, date};
 
 /// Where `--write` keeps what was measured.
 const PAGE: &str = "docs/loop.txt";
@@ -62,8 +62,8 @@ pub fn grade(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     if asked.image > 0 {
         crate::build_image(root, &mut Pace::Steady)?;
     }
-    let commit = said_by(root, "git", &["describe", "--always", "--dirty"]);
-    let date = said_by(root, "date", &["+%Y-%m-%d"]);
+    let commit = commit(root);
+    let date = date();
     let mut page = format!(
         "# `cargo xtask loop --write` writes this: how near corrected rates come to what the noise alone leaves (measurements.md, The loop).\n\
          # {date}, commit {commit}: cargo xtask loop --draws {} --image {} --seed {seed}\n",
@@ -114,18 +114,6 @@ fn graded(said: &str) -> impl Iterator<Item = &str> {
         .skip_while(|line| !line.starts_with("draw "))
         .take_while(|line| !line.is_empty() && !line.starts_with("test "))
         .filter(|line| *line != ".")
-}
-
-/// What a program says, on one line; empty where it is missing.
-fn said_by(root: &Path, program: &str, arguments: &[&str]) -> String {
-    let output = Command::new(program)
-        .current_dir(root)
-        .args(arguments)
-        .output();
-    output.map_or_else(
-        |_| String::new(),
-        |output| String::from_utf8_lossy(&output.stdout).trim().to_owned(),
-    )
 }
 
 #[cfg(test)]

@@ -41,7 +41,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   effects  writes docs/effects.md and its figures from the files of the effects; --check tells whether they are current
   image    builds the firmware for the ATmega16: target/avr/avr-none/firmware/firmware.{elf,hex};
            --check-reproducible builds it in another folder too and compares
-  size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt
+  size     what the image costs beside the same function in C, and what grew; --accept writes docs/image-size.txt;
+           --search-flags looks for the C compiler's options of least flash, from `-fOPTION ...` on; --write keeps docs/c-flags.txt
   mutants  plants small faults in drivers, wire, firmware and bench, one at a time, and says which of them no test notices;
            --seed N and --count N draw, --minutes N bounds, --write keeps docs/mutants.txt, --registers plants those that only the image has
   loop     grades the loop over draws: recorded, diagnosed, the board corrected, recorded again; --draws N by the firmware's
@@ -176,6 +177,7 @@ mod tests {
     fn every_command_says_what_it_does_where_it_is_asked() {
         for (command, told) in [
             ("size", "--accept"),
+            ("size", "--search-flags"),
             ("soak", "--only logic"),
             ("fuzz", "--target NAME"),
             ("compare-peers", "--long"),

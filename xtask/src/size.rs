@@ -1,9 +1,11 @@
 //! What the image costs, beside the same function in C, and what grew since the figures in docs/image-size.txt.
 
+mod search;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use crate::image::{self, Sizes};
 use crate::step::{Failure, Pace, run};
@@ -89,10 +91,11 @@ pub fn report(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     let accept = match arguments {
         [] => false,
         [option] if option == "--accept" => true,
+        [option, more @ ..] if option == "--search-flags" => return search::search(root, more),
         _ => {
             return Err(Failure::new(
                 &format!("`size` does not know {}", arguments.join(" ")),
-                "cargo xtask size, or cargo xtask size --accept",
+                "cargo xtask size, with --accept or --search-flags, or nothing",
             ));
         }
     };
@@ -100,9 +103,9 @@ pub fn report(root: &Path, arguments: &[String]) -> Result<(), Failure> {
     let c = build_reference(root)?;
     let sizes = [image::sizes(&rust)?, image::sizes(&c)?];
     let costs = measure(root, &[&rust, &c]);
-    let table = match &costs {
-        Ok([of_rust, of_c]) => table(&sizes, Some([*of_rust, *of_c])),
-        Err(_) => table(&sizes, None),
+    let table = match costs.as_deref() {
+        Ok(&[of_rust, of_c]) => table(&sizes, Some([of_rust, of_c])),
+        _ => table(&sizes, None),
     };
     print!("{table}");
     if let Err(why) = &costs {
@@ -128,8 +131,19 @@ pub fn report(root: &Path, arguments: &[String]) -> Result<(), Failure> {
 
 /// Builds the C reference as its README says, by `AVR_GCC` where it is set.
 fn build_reference(root: &Path) -> Result<PathBuf, Failure> {
-    let folder = root.join("hil-tests/c-reference");
     let elf = root.join("target/avr/reference.elf");
+    build_with(root, &[], &elf, Stdio::inherit())?;
+    Ok(elf)
+}
+
+/// Builds it with options beside those in `flags`; what the compiler says goes to `complaints`.
+fn build_with(
+    root: &Path,
+    options: &[String],
+    elf: &Path,
+    complaints: Stdio,
+) -> Result<(), Failure> {
+    let folder = reference_folder(root);
     let no_folder = |error| {
         Failure::new(
             &format!("{}: {error}", folder.display()),
@@ -145,20 +159,29 @@ fn build_reference(root: &Path) -> Result<PathBuf, Failure> {
     }
     // LTO lays the code out in this order.
     sources.sort();
-    let elf_from_folder = std::path::absolute(&elf).map_err(no_folder)?;
-    // Another release, or a script that adds options.
-    let mut gcc = Command::new(std::env::var_os("AVR_GCC").unwrap_or_else(|| "avr-gcc".into()));
-    gcc.current_dir(&folder)
-        .arg("@flags")
+    let elf_from_folder = std::path::absolute(elf).map_err(no_folder)?;
+    let mut gcc = gcc(root, &["@flags"]);
+    gcc.args(options)
         .args(sources)
         .arg("-o")
-        .arg(elf_from_folder);
-    run("the build of the C reference", &mut gcc)?;
-    Ok(elf)
+        .arg(elf_from_folder)
+        .stderr(complaints);
+    run("the build of the C reference", &mut gcc)
+}
+
+fn reference_folder(root: &Path) -> PathBuf {
+    root.join("hil-tests/c-reference")
+}
+
+/// The compiler of the C reference, in its folder; `AVR_GCC` names another release, or a script that adds options.
+fn gcc(root: &Path, arguments: &[&str]) -> Command {
+    let mut gcc = Command::new(std::env::var_os("AVR_GCC").unwrap_or_else(|| "avr-gcc".into()));
+    gcc.current_dir(reference_folder(root)).args(arguments);
+    gcc
 }
 
 /// Runs the images in the simulator, which not every machine has the libraries for.
-fn measure(root: &Path, images: &[&Path; 2]) -> Result<[Cost; 2], String> {
+fn measure(root: &Path, images: &[&Path]) -> Result<Vec<Cost>, String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
         .current_dir(root)
@@ -179,7 +202,7 @@ fn measure(root: &Path, images: &[&Path; 2]) -> Result<[Cost; 2], String> {
         return Err("hil-tests/examples/cost.rs does not build or run, see above".to_owned());
     }
     let text = String::from_utf8_lossy(&output.stdout);
-    let mut costs = text.lines().map(|line| {
+    let costs = text.lines().map(|line| {
         let value = |key: &str| {
             let word = line
                 .split_whitespace()
@@ -195,9 +218,11 @@ fn measure(root: &Path, images: &[&Path; 2]) -> Result<[Cost; 2], String> {
             jitter: value("jitter")?,
         })
     });
-    match (costs.next(), costs.next()) {
-        (Some(rust), Some(c)) => Ok([rust?, c?]),
-        _ => Err("cost says too little".to_owned()),
+    let costs = costs.collect::<Result<Vec<Cost>, String>>()?;
+    if costs.len() == images.len() {
+        Ok(costs)
+    } else {
+        Err("cost says too little".to_owned())
     }
 }
 

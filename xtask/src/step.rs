@@ -1,6 +1,7 @@
 //! Running programs: what they say is kept, how far they are is shown, and what failed is said.
 
 use std::io::{BufRead, BufReader, IsTerminal as _, Read, Write as _};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
@@ -42,6 +43,27 @@ pub fn run(what: &str, command: &mut Command) -> Result<(), Failure> {
         &format!("{what} failed ({status})"),
         "its own message stands above",
     ))
+}
+
+/// What a program says; empty where it is missing.
+pub fn said_by(command: &mut Command) -> String {
+    let output = command.output().map(|output| output.stdout);
+    let output = output.unwrap_or_default();
+    String::from_utf8_lossy(&output).trim().to_owned()
+}
+
+/// The commit that is checked out, and whether something differs from it.
+pub fn commit(root: &Path) -> String {
+    let mut git = Command::new("git");
+    said_by(
+        git.current_dir(root)
+            .args(["describe", "--always", "--dirty"]),
+    )
+}
+
+/// Today.
+pub fn date() -> String {
+    said_by(Command::new("date").arg("+%Y-%m-%d"))
 }
 
 fn unstarted(what: &str, error: &std::io::Error) -> Failure {

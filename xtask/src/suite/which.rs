@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 /// Test programs that wait for a board's clock or a browser more than they compute, the long ones first: a worker of their own runs
 /// them, each with four tests at a time.
 pub const WAIT: &[&str] = &[
+    "imu-stand correct_port",
     "imu-stand live_page",
     "imu-stand soak",
     "imu-stand board",
@@ -62,6 +63,7 @@ pub const LONG: &[&str] = &[
     "imu-stand bring_up",
     "imu-stand live_page",
     "imu-stand correct",
+    "imu-stand correct_port",
     "imu-stand sequences",
     "imu-stand model_out",
     "imu-stand browser",

@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use bench::{Run, Scenario, Timeline};
 use imu_stand::pty::{Cable, Pace};
@@ -167,21 +167,70 @@ impl Damage {
     }
 }
 
-/// Both ends of the line; `None` while it is unplugged.
-type Ends = Arc<Mutex<Option<(TTYPort, TTYPort)>>>;
+/// What the board's thread and the tests' share.
+#[derive(Default)]
+struct Shared {
+    /// Both ends of the line; `None` while it is unplugged.
+    ends: Mutex<Option<(TTYPort, TTYPort)>>,
+    /// Bytes that the board is sent by somebody else.
+    aside: Mutex<Vec<u8>>,
+    /// Samples that were sent while nothing was plugged in.
+    unheard: AtomicU64,
+    /// Samples whose frames went onto the line whole, in their order: number and ticks.
+    intact: Mutex<Vec<(u16, u32)>>,
+    stop: AtomicBool,
+}
+
+/// A clock that stands while a busy computer holds up the host that keeps the motor alive, as no host is held up that has a
+/// computer for itself: a test of minutes is not to end by a motor that was cut.
+#[derive(Clone, Copy, Debug, Default)]
+struct Leash {
+    /// When the motor was kept alive last, s; `None` while it is off.
+    alive_s: Option<f64>,
+}
+
+impl Leash {
+    /// So long after the last keep-alive the clock stands, s: the board cuts the motor after 0.2.
+    const REACH_S: f64 = 0.15;
+    /// A host that says nothing for so long has gone.
+    const MOST: Duration = Duration::from_secs(10);
+
+    /// A request arrives at `t` s.
+    fn hears(&mut self, command: &wire::Command, t: f64) {
+        match command {
+            wire::Command::MotorDuty { duty: 0 } => self.alive_s = None,
+            wire::Command::Arm { nonce: 0 } => {}
+            wire::Command::Arm { .. }
+            | wire::Command::KeepAlive
+            | wire::Command::MotorDuty { .. } => self.alive_s = Some(t),
+            _ => {}
+        }
+    }
+
+    /// Holds the clock at `t` s until the host speaks again, if that is due.
+    fn hold(&mut self, shared: &Shared, t: f64) {
+        let waited = Instant::now();
+        while self.alive_s.is_some_and(|alive| t - alive > Self::REACH_S) {
+            let speaks = match &*shared.ends.lock().unwrap() {
+                Some((master, _)) => master.bytes_to_read().is_ok_and(|count| count > 0),
+                None => false,
+            };
+            if speaks {
+                return;
+            }
+            if waited.elapsed() > Self::MOST || shared.stop.load(Ordering::Relaxed) {
+                self.alive_s = None;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
 
 /// The simulated board, in real time, on a pseudo-terminal.
 pub struct Board {
     /// A link to the device, whose name changes when it is plugged in again.
     path: PathBuf,
-    ends: Ends,
-    /// Bytes that the board is sent by somebody else.
-    aside: Arc<Mutex<Vec<u8>>>,
-    /// Samples that were sent while nothing was plugged in.
-    unheard: Arc<AtomicU64>,
-    /// Samples whose frames went onto the line whole, in their order: number and ticks.
-    intact: Arc<Mutex<Vec<(u16, u32)>>>,
-    stop: Arc<AtomicBool>,
+    shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -193,24 +242,27 @@ impl Board {
 
     /// This stand, behind this cable.
     pub fn with(scenario: Scenario, swallow: Swallow) -> Self {
+        Self::served(scenario, swallow, None)
+    }
+
+    /// This stand, which waits for a host that is held up while it keeps the motor alive.
+    pub fn that_waits(scenario: Scenario) -> Self {
+        Self::served(scenario, Swallow::default(), Some(Leash::default()))
+    }
+
+    fn served(scenario: Scenario, swallow: Swallow, leash: Option<Leash>) -> Self {
         static NUMBER: AtomicUsize = AtomicUsize::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let name = format!("port-{}-{number}", std::process::id());
-        let stop = Arc::new(AtomicBool::new(false));
         let mut board = Board {
             path: Path::new(env!("CARGO_TARGET_TMPDIR")).join(name),
-            ends: Arc::default(),
-            aside: Arc::default(),
-            unheard: Arc::default(),
-            intact: Arc::default(),
-            stop: Arc::clone(&stop),
+            shared: Arc::default(),
             thread: None,
         };
         board.plug();
-        let (ends, aside) = (Arc::clone(&board.ends), Arc::clone(&board.aside));
-        let (unheard, intact) = (Arc::clone(&board.unheard), Arc::clone(&board.intact));
+        let shared = Arc::clone(&board.shared);
         board.thread = Some(std::thread::spawn(move || {
-            serve(&ends, &aside, &unheard, &intact, scenario, swallow, &stop);
+            serve(&shared, scenario, swallow, leash);
         }));
         board
     }
@@ -223,23 +275,23 @@ impl Board {
         let _ = std::fs::remove_file(&self.path);
         std::os::unix::fs::symlink(device, &self.path).expect("a link to it");
         // The slave stays open here, so that the line lives on between two runs of the program.
-        *self.ends.lock().unwrap() = Some((master, slave));
+        *self.shared.ends.lock().unwrap() = Some((master, slave));
     }
 
     /// Pulls it out; the board goes on.
     pub fn unplug(&self) {
         let _ = std::fs::remove_file(&self.path);
-        *self.ends.lock().unwrap() = None;
+        *self.shared.ends.lock().unwrap() = None;
     }
 
     /// Samples that it sent while the cable was out.
     pub fn unheard(&self) -> u64 {
-        self.unheard.load(Ordering::Relaxed)
+        self.shared.unheard.load(Ordering::Relaxed)
     }
 
     /// Samples whose frames went onto the line whole, in their order: number and ticks.
     pub fn intact(&self) -> Vec<(u16, u32)> {
-        self.intact.lock().unwrap().clone()
+        self.shared.intact.lock().unwrap().clone()
     }
 
     /// Sends the board a command without the program's knowledge.
@@ -247,7 +299,7 @@ impl Board {
         let mut line = [0; Request::FRAME_LEN];
         let request = Request { number: 7, command };
         let length = encode_request(&request, &mut line).expect("it fits");
-        self.aside.lock().unwrap().extend(&line[..length]);
+        self.shared.aside.lock().unwrap().extend(&line[..length]);
     }
 
     /// The device.
@@ -265,7 +317,7 @@ impl Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
+        self.shared.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -278,15 +330,7 @@ fn taken(list: &mut Vec<u8>, code: u8) -> bool {
     at.map(|at| list.remove(at)).is_some()
 }
 
-fn serve(
-    ends: &Ends,
-    aside: &Mutex<Vec<u8>>,
-    unheard: &AtomicU64,
-    intact: &Mutex<Vec<(u16, u32)>>,
-    scenario: Scenario,
-    swallow: Swallow,
-    stop: &AtomicBool,
-) {
+fn serve(shared: &Shared, scenario: Scenario, swallow: Swallow, mut leash: Option<Leash>) {
     let swallow = std::cell::RefCell::new(swallow);
     let run = Run {
         scenario,
@@ -297,15 +341,21 @@ fn serve(
     let mut requests = RequestDecoder::new();
     let mut request = Vec::new();
     let listen = |t: f64| {
+        if let Some(leash) = &mut leash {
+            leash.hold(shared, t);
+        }
         pace.wait(t);
-        let arrived = match &mut *ends.lock().unwrap() {
+        let arrived = match &mut *shared.ends.lock().unwrap() {
             Some((master, _)) => cable.read(master, t).unwrap_or_default(),
             None => Vec::new(),
         };
-        let mut through = std::mem::take(&mut *aside.lock().unwrap());
+        let mut through = std::mem::take(&mut *shared.aside.lock().unwrap());
         for byte in arrived {
             request.push(byte);
             let decoded = requests.push(byte);
+            if let (Some(leash), Some(Ok(request))) = (&mut leash, &decoded) {
+                leash.hears(&request.command, t);
+            }
             if byte == 0 {
                 let lost = matches!(&decoded, Some(Ok(r))
                     if taken(&mut swallow.borrow_mut().requests, r.command.code()));
@@ -329,22 +379,22 @@ fn serve(
                 _ => false,
             };
             let is_whole = swallow.damage.as_mut().is_none_or(|d| d.pass(&mut frame));
-            match (lost, &mut *ends.lock().unwrap()) {
+            match (lost, &mut *shared.ends.lock().unwrap()) {
                 // A line that nobody reads overflows.
                 (false, Some((master, _))) => {
                     let is_sent = master.write_all(&frame).is_ok();
                     if let (true, true, Some(Ok(Frame::Sample(s)))) = (is_sent, is_whole, decoded) {
-                        intact.lock().unwrap().push((s.seq, s.t_ticks));
+                        shared.intact.lock().unwrap().push((s.seq, s.t_ticks));
                     }
                 }
                 (false, None) if matches!(decoded, Some(Ok(Frame::Sample(_)))) => {
-                    unheard.fetch_add(1, Ordering::Relaxed);
+                    shared.unheard.fetch_add(1, Ordering::Relaxed);
                 }
                 _ => {}
             }
             frame.clear();
         }
-        if stop.load(Ordering::Relaxed) {
+        if shared.stop.load(Ordering::Relaxed) {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
