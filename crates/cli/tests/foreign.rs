@@ -3,6 +3,8 @@
 
 #[path = "foreign/any_bytes.rs"]
 mod any_bytes;
+#[path = "foreign/forms.rs"]
+mod forms;
 #[path = "foreign/names.rs"]
 mod names;
 #[path = "foreign/pandas.rs"]

@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::time::is_date;
+use super::infinite::is_infinite;
+use super::time::{is_date, with_unit};
 
 /// The minus of typography, U+2212.
 const MINUS: char = '\u{2212}';
@@ -63,7 +64,22 @@ fn short_decimal(text: &[u8]) -> Option<(f64, usize, bool)> {
 
 /// Whether a cell says that there is no reading: nothing, or what tables write for it.
 pub(super) fn is_missing(cell: &str) -> bool {
-    const WORDS: [&str; 7] = ["nan", "na", "n/a", "#n/a", "<na>", "null", "none"];
+    // The last three are NaN as Microsoft's library wrote it.
+    const WORDS: [&str; 13] = [
+        "nan",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "na",
+        "n/a",
+        "#n/a",
+        "<na>",
+        "null",
+        "none",
+        "1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+    ];
     cell.is_empty() || WORDS.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
@@ -282,8 +298,10 @@ impl Cells {
         let (mut numbers, mut all) = (0, 0);
         for cell in cells.iter().filter(|cell| !is_missing(cell)) {
             all += 1;
-            let is_number = reader.number(cell).is_some() || reader.why_not(cell).is_some();
-            numbers += usize::from(is_number || is_date(cell));
+            let is_number = reader.number(cell).is_some()
+                || reader.why_not(cell).is_some()
+                || is_infinite(cell);
+            numbers += usize::from(is_number || is_date(cell) || with_unit(cell).is_some());
         }
         2 * numbers > all
     }

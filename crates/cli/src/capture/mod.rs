@@ -14,20 +14,26 @@ mod corrected;
 mod ends;
 mod error;
 mod foreign;
+mod forms;
 #[cfg(feature = "native")]
 mod guard;
 mod header;
 mod heal;
 mod held;
+mod hexadecimal;
+mod infinite;
 mod layout;
 mod live;
 mod logs;
+mod lvm;
+mod made;
 mod mapped;
 mod names;
 mod order;
 mod own;
 #[cfg(feature = "native")]
 mod pages;
+mod phone;
 mod plausible;
 mod preamble;
 mod propose;

@@ -56,19 +56,27 @@ pub(super) fn respelt(
     let known = OURS.iter().chain(more).filter(|ours| ours.len() > 1);
     let known: Vec<(&str, String)> = known.map(|ours| (*ours, plain(ours))).collect();
     let mut notes = Vec::new();
+    let has_gyro = names.iter().any(|n| meaning(n).0 == Quantity::Gyro);
+    let gyros = names.iter().filter(|_| !has_gyro).filter_map(|n| alias(n));
+    let gyros: Vec<String> = gyros.filter(|ours| ours.starts_with("gyro_")).collect();
     let ours = |(name, own): (&String, &String)| {
-        let (found, _) = known.iter().find(|(_, plain)| plain == own)?;
+        let found = known.iter().find(|(_, plain)| plain == own);
+        let found = found.map(|(ours, _)| (*ours).to_owned());
+        // As Bosch and others write it beside `acc_x`.
+        let is_one = |ours: &String| gyros.iter().filter(|gyro| *gyro == ours).count() == 1;
+        let gyro = || alias(name).filter(is_one);
+        let found = found.or_else(gyro)?;
         // Looked for last: a table may have a hundred thousand columns.
         if plains.iter().filter(|other| *other == own).nth(1).is_some() {
             return None;
         }
-        if found != name {
+        if found != *name {
             notes.push(format!(
                 "column `{}` is taken as `{found}`, the name that it has here",
                 brief(name)
             ));
         }
-        Some((*found).to_owned())
+        Some(found)
     };
     let found: Vec<Option<String>> = names.iter().zip(&plains).map(ours).collect();
     let names = found.into_iter().zip(names);
@@ -220,6 +228,9 @@ mod tests {
                 "gyro_x,gyro_y,gyro_z,acc_x,time",
             ),
             ("SEQ,GyroX,Temp", true, "seq,gyro_x,temp"),
+            ("acc_x,gyr_x,Gyr_Y", false, "acc_x,gyro_x,gyro_y"),
+            ("acc_x,gyro_y,gyr_x", false, "acc_x,gyro_y,gyr_x"),
+            ("acc_x,gyr_x,gyroscope_x", false, "acc_x,gyr_x,gyroscope_x"),
             // Ours is there too; two may be it; the file is not known to be ours.
             ("gyro_x,Gyro_X", true, "gyro_x,Gyro_X"),
             ("gyro_y,Gyro-X,gyro x", true, "gyro_y,Gyro-X,gyro x"),

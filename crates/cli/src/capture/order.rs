@@ -74,15 +74,15 @@ pub(super) fn unwrap(values: &[u64], modulus: u64) -> Vec<u64> {
         .collect()
 }
 
-/// Undoes the wrapping of a time that a counter of 32 or 16 bits holds, as boards' microseconds do every 71 minutes and their
-/// milliseconds in a `uint16_t` every 66 s. How often, and how many bits it has; `None` where it goes on.
+/// Undoes the wrapping of a time that a counter of 32, 24 or 16 bits holds, as boards' microseconds do every 71 minutes, their
+/// milliseconds in a `uint16_t` every 66 s, and the `sensor_time` of Bosch's parts every 655.36 s. How often, and how many bits it has; `None` where it goes on.
 pub(super) fn unwrap_times(times: &mut [f64], scale: f64) -> Option<(usize, u32)> {
     let turns = unwrap_far(times, scale * 4_294_967_296.0);
     if turns > 0 {
         return Some((turns, 32));
     }
     // Ticks of the unit of the column, or of what boards count in: thousandths and millionths of it.
-    for (bits, tick) in [16, 32].iter().flat_map(|b| TICKS.map(|t| (*b, t))) {
+    for (bits, tick) in [16, 24, 32].iter().flat_map(|b| TICKS.map(|t| (*b, t))) {
         let turns = unwrap_even(times, scale * tick * 2f64.powi(bits));
         if turns > 0 {
             return Some((turns, bits as u32));
@@ -198,12 +198,26 @@ pub(super) fn check_times(times: &[f64], is_assumed: bool) -> Result<(), Capture
             why: format!("in seconds, rows would be {usual} s apart"),
             help: format!(
                 "say the unit of the time column: `--units time=ms` ({}; s if it is so; `0.1ms` and the like if it counts \
-                 something else), or leave it out and say `--rate HZ`",
-                by_unit(usual)
+                 something else{}), or leave it out and say `--rate HZ`",
+                by_unit(usual),
+                of_bosch(times, usual)
             ),
         });
     }
     Ok(())
+}
+
+/// What steps may be of the `sensor_time` of Bosch's parts, a counter of 25.6 kHz (data sheets of BMI088, BMI160).
+fn of_bosch(times: &[f64], step: f64) -> String {
+    const HZ: f64 = 25_600.0;
+    let is_likely = step >= 4.0 && times.iter().all(|t| t.fract() == 0.0);
+    match is_likely {
+        true => format!(
+            ", 39.0625us for the `sensor_time` of Bosch's parts: {} Hz",
+            number(HZ / step, 4)
+        ),
+        false => String::new(),
+    }
 }
 
 /// The sample rate that each unit of a time makes of a step.

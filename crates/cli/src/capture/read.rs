@@ -1,6 +1,7 @@
 //! Reading.
 
 use std::borrow::Cow;
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -8,15 +9,17 @@ use std::path::Path;
 use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
-use super::carried::as_table;
 use super::columns::{Column, Columns, Role, Said, columns};
 use super::corrected::without_unapplied;
 use super::error::brief;
 use super::foreign::meaning;
+use super::forms::as_table;
 use super::header::Lines;
+use super::infinite::Infinite;
 use super::layout::{Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
+use super::phone;
 use super::plausible::{doubts, in_range};
 use super::preamble::{stated, stated_by};
 use super::propose::proposed;
@@ -32,7 +35,6 @@ use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
 use super::tables::read_table;
-use super::utf16::utf8;
 use super::{CaptureError, ColumnMapping};
 
 /// How to read.
@@ -80,7 +82,7 @@ pub fn read_capture(path: &Path, options: &ReadOptions) -> Result<Read, CaptureE
     // An error of the stream has no path yet.
     open()
         .map_err(io)
-        .and_then(|text| read_from(text, options))
+        .and_then(|text| read_named(text, options, path.file_stem().and_then(OsStr::to_str)))
         .map_err(|error| named(error, path))
 }
 
@@ -101,18 +103,25 @@ fn no_topics(options: &ReadOptions) -> Result<(), CaptureError> {
 ///
 /// # Errors
 /// [`CaptureError`].
-pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
+pub fn read_from(input: impl BufRead, options: &ReadOptions) -> Result<Read, CaptureError> {
+    read_named(input, options, None)
+}
+
+/// The same of a file of this name, without its ending.
+fn read_named(
+    mut input: impl BufRead,
+    options: &ReadOptions,
+    file: Option<&str>,
+) -> Result<Read, CaptureError> {
     if let Some(table) = read_log(&mut input, options.topic.as_deref()) {
         return from_table(table?, options, Of::File);
     }
     no_topics(options)?;
-    let (input, carried) = utf8(input).and_then(as_table).map_err(io)?;
+    let (input, forms) = as_table(input).map_err(io)?;
     let mut text = TextLines::new(input)?;
     let mut layout = Layout::read(&mut text)?;
-    if let Some(carried) = &carried {
-        let carried = carried.borrow();
-        layout.take_names(&carried.names, &carried.units);
-    }
+    forms.take(&mut layout)?;
+    let of_phone = phone::take(&mut layout, file, &options.mapping);
     if layout.first.is_none() {
         // Before anything is asked of its columns.
         return Err(CaptureError::Empty);
@@ -143,11 +152,12 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
             )?;
             let knows_rate = said.knows_rate || said.states_rate;
             let error = proposed(error, &said, &options.mapping, knows_rate, &seen);
-            return Err(scales.mention(error));
+            return Err(forms.mention(scales.mention(error)));
         }
         Ok(found) => found,
     };
-    found.ask().map_err(|error| scales.mention(error))?;
+    (found.ask()).map_err(|error| forms.mention(scales.mention(error)))?;
+    found.notes.extend(of_phone);
     found.notes.extend(scales.notes);
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
@@ -179,9 +189,9 @@ pub fn read_from(mut input: impl BufRead, options: &ReadOptions) -> Result<Read,
     let grouped = reader.grouped();
     reader.sensors.take().map_or(Ok(()), Sensors::one)?;
     found.notes.extend(grouped);
-    found
-        .notes
-        .extend(carried.iter().flat_map(|carried| carried.borrow().notes()));
+    found.notes.extend(reader.infinite());
+    found.time_is_assumed &= !reader.times_have_units();
+    found.notes.extend(forms.notes());
     if let Some(first) = again.first() {
         found.notes.push(format!(
             "the names of the columns stand again {} x, first in line {first}, as where files were put end to end: the rows are read on",
@@ -259,11 +269,11 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
     }
     found.notes.splice(..0, table.notes);
     found.keep_rate(in_words, options.rate_hz);
-    let mut cells = Vec::new();
+    let (mut cells, mut infinite) = (Vec::new(), Infinite::default());
     for column in &found.columns {
         let mut values = table.columns[column.at].clone();
-        if !column.is_asked {
-            (values.iter_mut().filter(|v| v.is_infinite())).for_each(|v| *v = f64::NAN);
+        if matches!(column.role, Role::Measured { .. }) {
+            infinite.leave_out(&mut values, &column.name);
         }
         if let Some(row) = values.iter().position(|v| !column.role.takes(*v)) {
             return Err(CaptureError::BadRow {
@@ -278,6 +288,7 @@ fn from_table(table: Table, options: &ReadOptions, of: Of) -> Result<Read, Captu
         }
         cells.push(values);
     }
+    found.notes.extend(infinite.note());
     finish(header, found, cells, options, &[], &[])
 }
 

@@ -4,6 +4,7 @@ use super::CaptureError;
 use super::cells::{Cells, is_missing};
 use super::columns::{Column, Role};
 use super::error::brief;
+use super::infinite::{Infinite, is_infinite};
 use super::propose::date_of;
 use super::several::Sensors;
 use super::time::{Clock, is_date, is_of_day};
@@ -48,6 +49,8 @@ pub(super) struct RowReader<'a> {
     numbers: Vec<f64>,
     /// Of columns that nobody asked for: line and text of the first cell that is no number.
     pub odd: Vec<Option<(u64, String)>>,
+    /// Cells beyond all numbers.
+    beyond: Infinite,
     /// Who the rows are of, where a column says so.
     pub sensors: Option<Sensors>,
 }
@@ -71,6 +74,7 @@ impl<'a> RowReader<'a> {
             values: vec![0.0; columns.len()],
             numbers: Vec::new(),
             odd: vec![None; columns.len()],
+            beyond: Infinite::default(),
             sensors: Sensors::of(names, columns),
         }
     }
@@ -81,6 +85,16 @@ impl<'a> RowReader<'a> {
         Some(format!(
             "thousands are taken to be set off in groups: {first}"
         ))
+    }
+
+    /// Says how many cells are beyond all numbers, where there are any.
+    pub fn infinite(&self) -> Option<String> {
+        self.beyond.note()
+    }
+
+    /// Whether the times say their own unit, cell by cell.
+    pub fn times_have_units(&self) -> bool {
+        self.clocks.iter().any(|clock| clock.has_units)
     }
 
     /// Whether a line has the columns' names once more, as where files were put end to end.
@@ -147,6 +161,10 @@ impl<'a> RowReader<'a> {
             let is_measured = matches!(column.role, Role::Measured { .. });
             let read = match (cell, &column.role) {
                 (cell, _) if is_measured && is_missing(cell) => Some(f64::NAN),
+                (cell, _) if is_measured && is_infinite(cell) => {
+                    self.beyond.take(line, &column.name, cell);
+                    Some(f64::NAN)
+                }
                 (_, Role::Time { .. }) => {
                     let date = self.dates[k].and_then(|at| row.get(at));
                     let dated = date.and_then(|date| dated(date, cell));

@@ -2,6 +2,8 @@
 
 use chrono::{DateTime, NaiveDate, NaiveTime};
 
+use super::units::{What, convert, known};
+
 /// Beyond this, steps of an f64 are longer than 1: 2^53.
 const EXACT: i64 = 1 << 53;
 
@@ -12,6 +14,8 @@ pub(super) struct Clock {
     /// Seconds a unit.
     scale: f64,
     first: Option<i64>,
+    /// Whether a cell said its unit.
+    pub has_units: bool,
     /// The last time of day without a date, and the midnights before it.
     of_day: Option<(i64, i64)>,
     /// Of dates that do not say which number is the month's.
@@ -23,13 +27,18 @@ impl Clock {
         Self {
             scale,
             first: None,
+            has_units: false,
             of_day: None,
             days: Days::default(),
         }
     }
 
     /// Time of a cell, s; `number` reads one that is no date and no long whole number.
-    pub fn seconds(&mut self, cell: &str, number: impl FnOnce(&str) -> Option<f64>) -> Option<f64> {
+    pub fn seconds(
+        &mut self,
+        cell: &str,
+        mut number: impl FnMut(&str) -> Option<f64>,
+    ) -> Option<f64> {
         if let Ok(whole) = cell.parse::<i64>()
             && (whole.unsigned_abs() > EXACT.unsigned_abs() || self.first.is_some())
         {
@@ -37,6 +46,10 @@ impl Clock {
         }
         if let Some(value) = number(cell) {
             return Some(value * self.scale);
+        }
+        if let Some((digits, s)) = with_unit(cell) {
+            self.has_units = true;
+            return Some(number(digits)? * s);
         }
         let of_date = nanoseconds(cell).or_else(|| self.since_first_date(cell));
         let whole = of_date.or_else(|| self.since_midnight(cell))?;
@@ -71,6 +84,15 @@ impl Clock {
     }
 }
 
+/// The number and the length of the unit, s, of a cell that says it, as MATLAB writes the durations of a timetable: `0.05 sec`.
+pub(super) fn with_unit(cell: &str) -> Option<(&str, f64)> {
+    let (digits, unit) = cell.split_once(' ')?;
+    let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '.'));
+    let unit = known(unit).filter(|_| is_number)?;
+    let s = convert(What::Time, Some(unit)).ok()?.scale;
+    Some((digits, s))
+}
+
 /// Nanoseconds a day.
 const DAY_NS: i64 = 86_400_000_000_000;
 
@@ -85,9 +107,16 @@ pub(super) fn is_of_day(cell: &str) -> bool {
     of_day(cell).is_some()
 }
 
-/// A time of day without a date, since midnight.
+/// A time of day without a date, since midnight; or a span with its days, as pandas writes it: `0 days 00:00:00.05`.
 fn of_day(cell: &str) -> Option<i64> {
-    cell.contains(':').then(|| since_midnight(cell))?
+    if !cell.contains(':') {
+        return None;
+    }
+    let Some((days, time)) = cell.split_once(" days ").or(cell.split_once(" day ")) else {
+        return since_midnight(cell);
+    };
+    let days: i64 = days.parse().ok()?;
+    days.checked_mul(DAY_NS)?.checked_add(since_midnight(time)?)
 }
 
 /// A time of day, ns since midnight: `15:04:05.25`, `15:04:05:250`, `15-04-05.250`, `3:04:05.25 PM`.
@@ -238,6 +267,10 @@ mod tests {
             ["19:02:59:500", "19:03:00:000"],
             ["2014-06-30 23-59-59.5", "2014-07-01 00-00-00.0"],
             ["11:59:59.5 AM", "12:00:00 pm"],
+            ["0 days 23:59:59.500000", "1 days 00:00:00"],
+            ["59.5 sec", "60 sec"],
+            ["1 min", "60.5 sec"],
+            ["3599500 ms", "1 hr"],
             ["11:59:59.5PM", "12:00:00AM"],
             ["11/28/2026 3:04:05.5 PM", "11/28/2026 3:04:06 PM"],
             ["28/11/2026 15:04:05.5", "28/11/2026 15:04:06"],
@@ -262,6 +295,11 @@ mod tests {
             "1:2",
             "19:02:59:5",
             "PM",
+            "5 apples",
+            "0.05 deg",
+            "sec",
+            " sec",
+            "x days 00:00:01",
         ] {
             assert_eq!(read(1.0, [cell, "x"]), [None, None], "{cell}");
         }

@@ -258,9 +258,21 @@ pub(super) fn noise(subject: &Subject<'_>) -> Markup {
                                 td.number { (of(&diagnosed.extended_model, &channel.name, name).unwrap_or_else(dash)) }
                             }
                         }
+                        @if let Some(b) = crate::text::noise::instability(diagnosed, &channel.name) {
+                            tr {
+                                td { code { (channel.name) } }
+                                td { "bias instability" }
+                                td.number { (dash()) }
+                                td.number { (b) }
+                            }
+                        }
                     }
                 }
             } }
+            p.note {
+                "A bias instability B (flicker noise) is in a model only where it was found. Where it was not, the limit is the size that "
+                "would have been found 95 % of the time. The lowest point of an Allan curve over 0.664 is no B: white noise alone has one."
+            }
         }
     }
 }

@@ -1,13 +1,19 @@
-//! The noise of a model in words: bias, N and K of a channel, in the units in which `analyze` has them.
+//! The noise of a model in words: bias, N, B and K of a channel, in the units in which `analyze` has them.
 
+use diagnosis::result::Diagnosed;
+use model::effects::flicker;
 use model::file::ModelFile;
 use model::parameter::Parameter;
 
 use super::answer;
+use crate::report::plot::number;
 
 /// Part of the smallest random walk to be seen below which a limit is none: where the likelihood has its peak at no random walk
 /// at all, its curvature there says nothing.
 const NOTHING: f64 = 0.01;
+
+/// The parameter of flicker.
+const B: &str = "bias_instability";
 
 /// How much of a term the record shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +58,32 @@ pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option
         _ => answer::level(&value),
     };
     Some(Term { value, shown, said })
+}
+
+/// The bias instability B beside the causes: its size where flicker is one of them, else the limit that follows where it is
+/// not: of a larger one, 95 records in 100 would have shown it. `None` where nothing looked for it. The lowest point of the
+/// Allan curve over 0.664 is no B: white noise alone has one.
+#[must_use]
+pub fn instability(of: &Diagnosed, channel: &str) -> Option<String> {
+    let d = &of.diagnosis;
+    let is_on = |channels: &[String]| channels.iter().any(|c| c == channel);
+    let found = d.findings.iter();
+    let found = found.filter(|f| f.cause == flicker::ID && is_on(&f.channels));
+    let mut found = found.map(|f| f.per_channel.get(channel).unwrap_or(&f.parameters));
+    let modelled = of.extended_model.effects.iter();
+    let modelled = modelled.filter(|e| e.cause == flicker::ID);
+    let mut modelled = modelled.filter(|e| e.channels.is_empty() || is_on(&e.channels));
+    let of_term = found.next().or_else(|| Some(&modelled.next()?.parameters));
+    if let Some(b) = of_term.and_then(|p| p.get(B)) {
+        return Some(answer::level(b));
+    }
+    let mut limits = d.detection_limits.iter();
+    let limit = limits.find(|l| l.cause == flicker::ID && l.channel == channel)?;
+    let size = number(limit.value, 2);
+    Some(format!(
+        "< {size} {} (more would have been found)",
+        limit.unit
+    ))
 }
 
 /// The random walk that after `seconds` has gone as far as white noise moves a mean over them: K sqrt(T / 3) = N / sqrt(T).
@@ -100,6 +132,54 @@ mod tests {
             channels: vec![channel],
             ..ModelFile::paper()
         }
+    }
+
+    #[test]
+    fn the_bias_instability_is_that_of_the_flicker_found_else_what_would_have_been() {
+        let diagnosis = |findings: serde_json::Value| {
+            serde_json::json!({
+                "format": "", "input": {"file": "", "seconds": 1.0, "rate_hz": 1.0, "samples": 1, "channels": []},
+                "baseline": {}, "checks": [], "unexplained": [], "not_tested": [], "verdict": "adequate",
+                "findings": findings,
+                "detection_limits": [
+                    {"cause": "flicker", "channel": "gyro_y", "parameter": "bias_instability", "value": 169.1, "unit": "deg/h"}
+                ]
+            })
+        };
+        let diagnosed = |findings| Diagnosed {
+            diagnosis: serde_json::from_value(diagnosis(findings)).expect("a diagnosis"),
+            baseline_model: ModelFile::default(),
+            extended_model: ModelFile::default(),
+            evidence: vec![],
+        };
+        let of = diagnosed(serde_json::json!([{
+            "cause": "flicker", "channels": ["gyro_x"], "alternatives": [], "experiment": null, "gain": null,
+            "parameters": {"bias_instability": {"value": 226.0, "std_error": 10.0, "unit": "deg/h"}}
+        }]));
+        let said =
+            |of: &Diagnosed, channel| instability(of, channel).map(|b| b.replace('\u{a0}', " "));
+        assert_eq!(
+            said(&of, "gyro_x").as_deref(),
+            Some("226 deg/h (95 %: 206 to 246)")
+        );
+        assert_eq!(
+            said(&of, "gyro_y").as_deref(),
+            Some("< 169 deg/h (more would have been found)")
+        );
+        assert_eq!(said(&of, "gyro_z"), None);
+        // A term of the model that is no finding.
+        let mut of = diagnosed(serde_json::json!([]));
+        of.extended_model.effects = vec![model::file::EffectModel {
+            cause: "flicker".into(),
+            channels: vec!["gyro_z".into()],
+            parameters: [(
+                "bias_instability".to_owned(),
+                Parameter::estimated(3.0, 2.0, "deg/h"),
+            )]
+            .into(),
+        }];
+        assert_eq!(said(&of, "gyro_z").as_deref(), Some("< 6.9 deg/h"));
+        assert_eq!(said(&of, "gyro_x"), None);
     }
 
     #[test]

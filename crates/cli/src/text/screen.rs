@@ -174,7 +174,7 @@ fn shortened(what: &str) -> String {
     }
 }
 
-/// N and K of every channel with their 95 % intervals, before and after where the causes change them.
+/// N, B and K of every channel with their 95 % intervals, before and after where the causes change them.
 fn write_noise(out: &mut String, of: &Diagnosed) {
     let channels: Vec<&str> = (of.extended_model.channels.iter())
         .map(|c| c.name.as_str())
@@ -193,11 +193,20 @@ fn write_noise(out: &mut String, of: &Diagnosed) {
     let _ = writeln!(out, "\n{title}, with 95 % intervals");
     let seconds = of.diagnosis.input.seconds;
     for name in channels {
-        for (letter, key) in [("N", "angle_random_walk"), ("K", "rate_random_walk")] {
+        let term = |key: &str| {
             let before = noise::term(&of.baseline_model, name, key, seconds);
-            if let Some(after) = noise::term(&of.extended_model, name, key, seconds) {
-                let text = change(before, &after, without).replace('\u{a0}', " ");
-                let _ = writeln!(out, "    {name}  {letter} {text}");
+            let after = noise::term(&of.extended_model, name, key, seconds)?;
+            Some(change(before, &after, without))
+        };
+        // The baseline has no B.
+        let terms = [
+            ("N", term("angle_random_walk")),
+            ("B", noise::instability(of, name)),
+            ("K", term("rate_random_walk")),
+        ];
+        for (letter, text) in terms {
+            if let Some(text) = text {
+                let _ = writeln!(out, "    {name}  {letter} {}", text.replace('\u{a0}', " "));
             }
         }
     }

@@ -140,6 +140,11 @@ fn line_of(
         let stated = stated.and_then(|(_, at)| units_said.get(*at)?.as_deref());
         match (*key, said.or(stated.filter(|unit| *unit != COUNTS))) {
             // Seconds go without saying; other times are guessed by nobody.
+            ("time", None) if is_bosch(name_of("time")) => {
+                open.push("time");
+                units.push(format!("time={UNIT}"));
+                hints.push(OF_BOSCH.to_owned());
+            }
             ("time", None | Some("s")) => {}
             ("gyro", Some(unit)) if is_angle(unit) => {
                 open.push("angle");
@@ -199,6 +204,18 @@ const OF_COUNTS: [(&str, &str); 2] = [
          ADXL345 `acc=0.00390625g` (256 counts a g); others by their data sheets",
     ),
 ];
+
+/// What is known of a `sensor_time`: data sheets of BMI088 and BMI160, and Bosch's drivers of BMI270.
+const OF_BOSCH: &str = "put in the unit of the time: the `sensor_time` of Bosch's BMI parts counts `time=39.0625us`; of another \
+                        sensor see its data sheet";
+
+/// Whether a time has the name of the counter in Bosch's parts.
+fn is_bosch(name: &str) -> bool {
+    let letters = name.chars().filter(char::is_ascii_alphabetic);
+    letters
+        .collect::<String>()
+        .eq_ignore_ascii_case("sensortime")
+}
 
 /// What is known of the unit of a gyro by the names of the columns.
 fn hints_of_unit(names: &[String]) -> impl Iterator<Item = String> {
