@@ -15,7 +15,7 @@ pub(super) fn take(
     mapping: &ColumnMapping,
 ) -> Option<String> {
     let is_there = |mark: &&str| layout.names.iter().any(|name| name == mark);
-    let is_its = MARKS.iter().all(|mark| is_there(&mark)) && file?.starts_with(GYRO);
+    let is_its = MARKS.iter().all(is_there) && file?.starts_with(GYRO);
     if !is_its || !mapping.columns.is_empty() {
         return None;
     }
