@@ -5,6 +5,8 @@
 mod any_bytes;
 #[path = "foreign/forms.rs"]
 mod forms;
+#[path = "foreign/interleaved.rs"]
+mod interleaved;
 #[path = "foreign/names.rs"]
 mod names;
 #[path = "foreign/pandas.rs"]

@@ -22,6 +22,7 @@ mod heal;
 mod held;
 mod hexadecimal;
 mod infinite;
+mod interleaved;
 mod layout;
 mod live;
 mod logs;

@@ -16,6 +16,7 @@ use super::foreign::meaning;
 use super::forms::as_table;
 use super::header::Lines;
 use super::infinite::Infinite;
+use super::interleaved;
 use super::layout::{Layout, next_row_into};
 use super::logs::read_log;
 use super::order::{check_rate, check_times, check_varies, in_order, unwrap, unwrap_times};
@@ -342,6 +343,7 @@ fn finish(
         found.time_is_assumed = false;
         record.notes.push(in_words.gives(unit));
     }
+    interleaved::take(&mut record);
     let stated = record.header.rate_hz;
     let mut record = in_order(record);
     if let Some(times) = &record.host_time_s {
