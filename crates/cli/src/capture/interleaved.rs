@@ -6,7 +6,7 @@ use model::record::{Channel, Quantity, Record};
 
 use super::error::brief_list;
 
-/// Fewest rows of other sensors: a reading or two are lost in any log.
+/// Fewest rows without a reading of the sensor: one or two are lost in any log.
 const FEWEST: usize = 10;
 /// Of the rows without a reading of a sensor, at most one in so many is one that it should have had: its steps without them are even.
 const EVEN: f64 = 4.0;
@@ -24,21 +24,15 @@ pub(super) fn take(record: &mut Record) {
     let Some(leading) = kinds.find(|q| record.all(*q).next().is_some()) else {
         return;
     };
-    let has = |channel: &Channel, row: usize| !channel.values[row].is_nan();
-    let reads = |row: usize, leads: bool| {
-        let mut of = record
-            .channels
-            .iter()
-            .filter(|c| (c.quantity == leading) == leads);
-        of.any(|c| has(c, row))
-    };
-    let of_others: Vec<bool> = (0..record.len())
-        .map(|row| !reads(row, true) && reads(row, false))
-        .collect();
+    let leads = |row: usize| record.all(leading).any(|c| !c.values[row].is_nan());
+    let of_others: Vec<bool> = (0..record.len()).map(|row| !leads(row)).collect();
     let others = of_others.iter().filter(|o| **o).count();
+    if others < FEWEST {
+        return;
+    }
     let own = |all: &[f64]| kept(all, &of_others);
     let own_times = own(times);
-    if others < FEWEST || lost(&own_times).is_none_or(|lost| EVEN * lost > others as f64) {
+    if lost(&own_times).is_none_or(|lost| EVEN * lost > others as f64) {
         return;
     }
     let (mut between, mut fewer) = (vec![], vec![]);
@@ -64,7 +58,7 @@ pub(super) fn take(record: &mut Record) {
     }
     let leads = record.all(leading).map(|c| c.name.clone());
     let mut note = format!(
-        "{others} of {} rows are of other sensors, without a reading of {}: the rows of these are the record",
+        "{others} of {} rows have no reading of {}, and those that have one are even: these are the record",
         times.len(),
         listed(&leads.collect::<Vec<_>>())
     );
@@ -89,7 +83,7 @@ fn listed(names: &[String]) -> String {
     brief_list(names).join(", ")
 }
 
-/// What is of no other sensor.
+/// What is in the rows of the leading sensor.
 fn kept<T: Copy>(all: &[T], of_others: &[bool]) -> Vec<T> {
     let rows = all.iter().zip(of_others);
     rows.filter(|(_, other)| !**other)

@@ -35,14 +35,32 @@ fn rows_of_a_faster_accelerometer_are_no_missing_readings_of_the_gyro() {
     assert!((values(&read, "acc_z")[1] - 9.802).abs() < 1e-9);
     let notes = read.record.notes.join("\n");
     assert!(
-        notes.contains("1000 of 2000 rows are of other sensors"),
+        notes.contains("1000 of 2000 rows have no reading of gyro_x, and those"),
         "{notes}"
     );
     assert!(
         notes.contains("of acc_z the readings in these rows"),
         "{notes}"
     );
-    assert!(!notes.contains("have no reading"), "{notes}");
+    assert!(!notes.contains("nothing is concluded"), "{notes}");
+}
+
+#[test]
+fn rows_without_any_reading_that_leave_even_steps_are_no_missing_readings() {
+    let cell = |k: u32| {
+        if k % 3 == 0 {
+            format!("0.{k:04}")
+        } else {
+            "nan".to_owned()
+        }
+    };
+    let read = table(
+        "time_s,gyro_x_dps",
+        (0..3000).map(|k| (0.01 * f64::from(k), cell(k))).collect(),
+    );
+    assert_eq!(values(&read, "gyro_x").len(), 1000);
+    let rate = read.record.header.rate_hz.expect("a rate");
+    assert!((rate - 100.0 / 3.0).abs() < 1e-3, "{rate}");
 }
 
 #[test]
