@@ -2,7 +2,7 @@
 //! and no others, or one sensor reads in every row and another in every second. The rows of the gyros are the record, without
 //! gyros those of the accelerometers; what has no readings in them is taken between its own.
 
-use model::record::{Channel, Quantity, Record};
+use model::record::{Quantity, Record};
 
 use super::error::brief_list;
 
