@@ -70,7 +70,7 @@ pub(super) fn take(record: &mut Record) {
     }
     if !between.is_empty() {
         note += &format!(
-            "; {} have rows of their own and are taken between their readings: their noise is not that of the sensor",
+            "; what has rows of its own is taken between its readings, and has not the noise of its sensor: {}",
             listed(&between)
         );
     }

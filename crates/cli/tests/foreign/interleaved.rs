@@ -18,7 +18,7 @@ fn values<'a>(read: &'a Read, name: &str) -> &'a [f64] {
 #[test]
 fn rows_of_a_faster_accelerometer_are_no_missing_readings_of_the_gyro() {
     let row = |k: u32| {
-        let gyro = if k % 2 == 0 {
+        let gyro = if k.is_multiple_of(2) {
             format!("0.{k:04}")
         } else {
             String::new()
@@ -48,7 +48,7 @@ fn rows_of_a_faster_accelerometer_are_no_missing_readings_of_the_gyro() {
 #[test]
 fn rows_without_any_reading_that_leave_even_steps_are_no_missing_readings() {
     let cell = |k: u32| {
-        if k % 3 == 0 {
+        if k.is_multiple_of(3) {
             format!("0.{k:04}")
         } else {
             "nan".to_owned()
@@ -83,7 +83,7 @@ fn a_thermometer_with_rows_of_its_own_is_taken_between_them() {
     let off = |k: usize| (temperature[k] - 25.0 - 2e-4 * k as f64).abs();
     assert!((0..3000).all(|k| off(k) < 1e-3), "{:?}", &temperature[..9]);
     let notes = read.record.notes.join("\n");
-    assert!(notes.contains("temp have rows of their own"), "{notes}");
+    assert!(notes.contains("its sensor: temp"), "{notes}");
 }
 
 #[test]
