@@ -335,6 +335,26 @@ pub enum CaptureError {
     Empty,
 }
 
+impl CaptureError {
+    /// The same; one that asks for columns also with what is known of them.
+    pub(super) fn hinting(self, said: &str) -> Self {
+        match self {
+            Self::Columns {
+                why,
+                columns,
+                hint,
+                example,
+            } => Self::Columns {
+                hint: format!("{hint}; {said}"),
+                why,
+                columns,
+                example,
+            },
+            error => error,
+        }
+    }
+}
+
 /// Characters of a name or a cell that a message shows.
 const SHOWN: usize = 30;
 /// Names that a message lists.

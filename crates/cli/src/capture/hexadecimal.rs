@@ -196,17 +196,6 @@ impl Hexadecimal {
             None => return error,
         };
         match error {
-            CaptureError::Columns {
-                why,
-                columns,
-                hint,
-                example,
-            } => CaptureError::Columns {
-                hint: format!("{hint}; {said}"),
-                why,
-                columns,
-                example,
-            },
             CaptureError::Option { option, why, help } => CaptureError::Option {
                 option,
                 why,
@@ -217,7 +206,7 @@ impl Hexadecimal {
                 why: format!("nothing says the unit of {column}"),
                 help: format!("say what a count is, `gyro=0.0076deg/s`, `acc=0.000061g`; {said}"),
             },
-            error => error,
+            error => error.hinting(&said),
         }
     }
 }

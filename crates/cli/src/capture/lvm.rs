@@ -156,30 +156,18 @@ impl Lvm {
 
     /// An error that asks for columns or units, with what the file says of them.
     pub fn mention(&self, error: CaptureError) -> CaptureError {
-        let mut said = String::new();
+        let mut error = error;
         if !self.others.is_empty() {
-            said += &format!(
-                "; the file says {}: write how much of yours one of it is, as `gyro=80deg/s` for 12.5 mV a deg/s in volts",
+            error = error.hinting(&format!(
+                "the file says {}: write how much of yours one of it is, as `gyro=80deg/s` for 12.5 mV a deg/s in volts",
                 self.others.join(", ")
-            );
+            ));
         }
         if self.is_untimed {
-            said += "; its Delta_X is 1, as LabVIEW writes it where it knows no timing";
+            error =
+                error.hinting("its Delta_X is 1, as LabVIEW writes it where it knows no timing");
         }
-        match error {
-            CaptureError::Columns {
-                why,
-                columns,
-                hint,
-                example,
-            } => CaptureError::Columns {
-                hint: hint + &said,
-                why,
-                columns,
-                example,
-            },
-            error => error,
-        }
+        error
     }
 }
 

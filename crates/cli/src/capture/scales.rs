@@ -112,17 +112,6 @@ impl Scales {
         }
         let said = self.untaken.join(", ");
         match error {
-            CaptureError::Columns {
-                why,
-                columns,
-                hint,
-                example,
-            } => CaptureError::Columns {
-                hint: format!("{hint}; {said}"),
-                why,
-                columns,
-                example,
-            },
             CaptureError::Option {
                 option: "--units",
                 why,
@@ -140,7 +129,7 @@ impl Scales {
                      `gyro=0.0076deg/s`; {said}"
                 ),
             },
-            error => error,
+            error => error.hinting(&said),
         }
     }
 }
