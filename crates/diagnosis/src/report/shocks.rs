@@ -13,8 +13,7 @@ use crate::search::searched::Searched;
 use crate::test_level::CheckId;
 
 /// The finding of each blow; none of one that the final model does not bear out, by those channels whose noise does not make
-/// such readings by itself, neither as a whole nor by a process that is not what its name claims, and where it is no remainder of an
-/// effect whose shape does not hold. `failing` tells of a channel and
+/// such readings by itself, neither as a whole nor by a process that is not what its name claims. `failing` tells of a channel and
 /// a check.
 pub(crate) fn findings(
     searched: &[&Searched<'_>],
@@ -37,14 +36,13 @@ pub(crate) fn findings(
         if fitted.felt.iter().any(|felt| part(felt.channel)) {
             return None;
         }
-        let of_more = |felt: &&Felt| {
+        let by_process = |felt: &&Felt| {
             let s = searched[felt.channel];
             let name = s.target.name.as_str();
             propagate::is_of_a_process(s, felt.lr, felt.by_processes, &|id| failing(name, id))
-                || propagate::is_of_a_follower(s, felt.lr)
         };
         let lawful = fitted.felt.iter().filter(|felt| !by_noise(felt.channel));
-        let lawful = lawful.filter(|felt| !of_more(felt));
+        let lawful = lawful.filter(|felt| !by_process(felt));
         let told: f64 = lawful.map(|felt| felt.lr).sum();
         (told >= fitted.least).then(|| finding(of, &fitted, searched, grid))
     });

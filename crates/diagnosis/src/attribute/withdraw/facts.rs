@@ -29,7 +29,7 @@ const REMAINDER_BEYOND: f64 = 0.25;
 /// The same of what may have gone to a process: noise takes up what is off in any shape, a step or a line does in few.
 pub(super) const REMAINDER_PROCESS: f64 = 0.25;
 /// The same where a shape is known not to hold: what is off may be as large as what it explains.
-pub(super) const REMAINDER_UNLAWFUL: f64 = 1.0;
+const REMAINDER_UNLAWFUL: f64 = 1.0;
 /// Share of the energy of a slow channel from which on a line at its place swings as the channel does: a line elsewhere
 /// meets so much of it at a handful of thousands of frequencies.
 const SWINGS: f64 = 0.02;

@@ -7,9 +7,7 @@
 
 use std::collections::BTreeSet;
 
-use super::facts::{
-    Facts, LEFT, REMAINDER, REMAINDER_PROCESS, REMAINDER_UNLAWFUL, TOUCHED, generic,
-};
+use super::facts::{Facts, LEFT, REMAINDER, REMAINDER_PROCESS, TOUCHED, generic};
 use super::{Doubt, nearest_of};
 use crate::criticise::residual;
 use crate::fit::channel::{Form, Term, VarianceFound, is_wide};
@@ -205,19 +203,6 @@ pub(crate) fn is_of_a_process(
     };
     let larger = |t: &Term| LARGER * t.cluster.map_or(t.lr, |c| c.lr) > lr;
     made > MADE && s.state.terms.iter().any(|t| unlike(t) && larger(t))
-}
-
-/// Whether a blow of that likelihood ratio may be what the shape of an effect that follows a recorded channel leaves: the shape does not
-/// hold, and what it leaves may be as large as what it explains.
-pub(crate) fn is_of_a_follower(s: &Searched<'_>, lr: f64) -> bool {
-    let explains = |id: &str| -> f64 {
-        let own = s.state.terms.iter().filter(|t| t.effect.id() == id);
-        own.map(|t| t.lr).sum()
-    };
-    let unlike = s.laws.iter().filter(|(_, o)| o.p_value < o.id.level());
-    unlike
-        .map(|(id, _)| REMAINDER_UNLAWFUL * explains(id))
-        .any(|left| left > lr)
 }
 
 /// Whether noise that axes share is a side of what one of them takes from another in a way of its own.
