@@ -180,6 +180,99 @@ fn gazebo_and_gnss_ins_sim_hold_a_process_where_there_is_no_walk() {
     close(sigma[0], 0.002 * (6000.0f64 / 2.0).sqrt() * 3600.0);
 }
 
+/// A K that the diagnosis calls too small to be told from 0 is no size: the process found stays, no simulator walks, and a filter
+/// expects what a record of 600 s shows, sqrt(3) N / T.
+#[test]
+fn a_walk_too_small_to_be_told_leaves_the_process_to_the_consumers() {
+    let none = r#"rate_random_walk = { value = 0.00006, unit = "deg/s/sqrt(s)" }"#;
+    let with =
+        r#"rate_random_walk = { value = 0.00001, std_error = 0.00032, unit = "deg/s/sqrt(s)" }"#;
+    let text = MODEL.replace(with, none);
+    let imu = ImuNoise::of_model(&ModelFile::parse(&text).expect("a model"));
+    let Figure::Unseen(smallest) = imu.gyro[1].walk else {
+        panic!("K of y is not told from 0: {:?}", imu.gyro[1].walk);
+    };
+    close(smallest, 3f64.sqrt() * 5.2 / 60.0 / 600.0 * DEG);
+    let gz = imu.text(Consumer::Gz, 100.0);
+    close(
+        elements(&gz, "dynamic_bias_correlation_time")[1].unwrap(),
+        12.5,
+    );
+    let dictionary = imu.text(Consumer::GnssInsSim, 100.0);
+    close(list(&dictionary, "'gyro_b_corr': np.array([")[1], 12.5);
+    for (text, parameter) in [
+        (&gz, "dynamic_bias_stddev"),
+        (&dictionary, "gyro_b_stability"),
+    ] {
+        let held = |l: &&str| l.contains("gauss_markov") && l.contains(&format!("in {parameter}"));
+        assert_eq!(text.lines().filter(held).count(), 1, "{text}");
+    }
+    let matlab = imu.text(Consumer::Matlab, 100.0);
+    assert_eq!(list(&matlab, "'RandomWalk', [")[1], 0.0);
+    assert!(
+        matlab.contains("gyro_y: too small to be told from 0"),
+        "{matlab}"
+    );
+    let kalibr = imu.text(Consumer::Kalibr, 100.0);
+    assert!(kalibr.contains(&format!(
+        "walk {smallest:.6e} (too small to be told from 0; a record this long shows {smallest:.6e})"
+    )));
+    // By hand, of no record: as it is.
+    let by_hand = text.replace("[fitted_on]\nfile = \"run.csv\"\nseconds = 600.0\n", "");
+    let imu = ImuNoise::of_model(&ModelFile::parse(&by_hand).expect("a model"));
+    assert_eq!(imu.gyro[1].walk, Figure::Known(0.00006 * DEG));
+}
+
+/// gnss-ins-sim keeps 1 - 1 / (f_s b_corr) of a bias at each step, of accelerometers that no record had too.
+#[test]
+fn a_sensor_that_is_missing_is_still_a_number_to_gnss_ins_sim() {
+    let text = imu().text(Consumer::GnssInsSim, 100.0);
+    let (kept, drift) = (
+        list(&text, "'accel_b_corr': np.array(["),
+        list(&text, "'accel_b_stability': np.array(["),
+    );
+    assert_eq!((kept.len(), drift), (3, vec![0.0; 3]));
+    assert!(
+        kept.iter()
+            .all(|tau| (0.0..1.0).contains(&(1.0 - 0.01 / tau)))
+    );
+    for consumer in [Consumer::GnssInsSim, Consumer::Gz] {
+        let text = imu().text(consumer, 100.0);
+        assert!(text.contains("no accelerometer in the diagnosis"), "{text}");
+        assert!(
+            consumer != Consumer::Gz || !text.split("-->").next().unwrap()[4..].contains("--"),
+            "{text}"
+        );
+    }
+}
+
+/// The limit of a flicker that was not found stands in the diagnosis; a model file has none.
+#[test]
+fn matlab_is_told_how_large_the_flicker_may_be() {
+    let diagnosis = serde_json::json!({
+        "format": "imu-stand-diagnosis/1",
+        "input": {"file": "f", "seconds": 600.0, "rate_hz": 20.0, "samples": 12000, "channels": ["gyro_x"]},
+        "baseline": {}, "checks": [], "findings": [], "unexplained": [], "not_tested": [], "verdict": "adequate",
+        "extended": {"gyro_x": {"angle_random_walk": {"value": 5.0, "std_error": 0.03, "unit": "deg/sqrt(h)"}}},
+        "detection_limits": [
+            {"cause": "flicker", "channel": "gyro_x", "parameter": "bias_instability", "value": 169.0, "unit": "deg/h"}
+        ]
+    });
+    let diagnosis = serde_json::from_value(diagnosis).expect("a diagnosis");
+    let imu = ImuNoise::of_diagnosis(&diagnosis).expect("its noise");
+    let text = imu.text(Consumer::Matlab, 100.0);
+    let limit = format!(
+        "gyro_x: not established by this record; 95 % limit {:.6e}",
+        169.0 / 3600.0 * DEG
+    );
+    assert!(text.contains(&limit), "{text}");
+    let model = self::imu().text(Consumer::Matlab, 100.0);
+    assert!(
+        model.contains("gyro_x: not in this file; `imu-stand diagnose --json` says"),
+        "{model}"
+    );
+}
+
 /// PX4: EKF2 adds (n dt)^2 to an angle's variance and (w dt)^2 to a bias's at each step (predictCovariance); the thermal
 /// correction subtracts X0 + X1 d + X2 d^2 + X3 d^3 with d = T - TREF.
 #[test]

@@ -6,7 +6,7 @@ use diagnosis::result::{Diagnosis, Parameter};
 use model::ModelFile;
 
 use super::noise::{AxisNoise, Consumer, DEG, Figure, ImuNoise, ROOT_HOUR, noted};
-use crate::text::answer;
+use crate::text::{answer, noise as told};
 
 /// Parameters by name.
 type Parameters = BTreeMap<String, Parameter>;
@@ -105,6 +105,7 @@ impl ImuNoise {
             model.rate_hz,
             noise,
             causes.collect(),
+            &|_| Figure::Unknown,
         )
     }
 
@@ -141,6 +142,7 @@ impl ImuNoise {
             input.rate_hz,
             noise,
             causes,
+            &|channel| limit_of_flicker(diagnosis, channel),
         );
         let notes = diagnosis.input.notes.iter().map(|note| noted(note));
         let left = diagnosis.unexplained.iter().map(|left| {
@@ -159,16 +161,18 @@ impl ImuNoise {
         rate_hz: f64,
         noise: impl Iterator<Item = (&'a str, &'a Parameters)>,
         causes: Vec<Cause>,
+        limit_of_flicker: &dyn Fn(&str) -> Figure,
     ) -> Self {
         let axis = |(name, parameters): (&str, &Parameters)| AxisNoise {
             name: name.to_owned(),
             white: figure(parameters.get("angle_random_walk"), &WHITE),
             flicker: (causes.iter())
                 .find(|c| c.cause == "flicker" && c.channel == name)
-                .map_or(Figure::Unknown, |c| {
-                    figure(c.parameters.get("bias_instability"), &FLICKER)
-                }),
-            walk: figure(parameters.get("rate_random_walk"), &WALK),
+                .map_or_else(
+                    || limit_of_flicker(name),
+                    |c| figure(c.parameters.get("bias_instability"), &FLICKER),
+                ),
+            walk: walk(parameters, seconds),
         };
         let (gyro, rest): (Vec<_>, Vec<_>) = noise
             .map(axis)
@@ -240,8 +244,49 @@ impl ImuNoise {
 const WHITE: [(&str, f64); 2] = [("deg/sqrt(h)", DEG / ROOT_HOUR), ("m/s^2*sqrt(s)", 1.0)];
 /// Units of K.
 const WALK: [(&str, f64); 2] = [("deg/s/sqrt(s)", DEG), ("m/s^2/sqrt(s)", 1.0)];
-/// Unit of B, of a gyro.
-const FLICKER: [(&str, f64); 1] = [("deg/h", DEG / 3600.0)];
+/// Units of B.
+const FLICKER: [(&str, f64); 2] = [("deg/h", DEG / 3600.0), ("m/s^2", 1.0)];
+
+/// The largest B that a diagnosis would have missed on a channel where it found none.
+fn limit_of_flicker(diagnosis: &Diagnosis, channel: &str) -> Figure {
+    let mut limits = diagnosis.detection_limits.iter();
+    let limit = limits.find(|l| l.cause == "flicker" && l.channel == channel);
+    let to_si = |unit: &str| {
+        FLICKER
+            .iter()
+            .find(|(of, _)| *of == unit)
+            .map(|(_, si)| *si)
+    };
+    match limit.and_then(|l| Some(l.value * to_si(&l.unit)?)) {
+        Some(limit) if limit > 0.0 && limit.is_finite() => Figure::AtMost(limit),
+        _ => Figure::Unknown,
+    }
+}
+
+/// K in SI. What the diagnosis calls too small to be told from 0 is no size; where no length is known, as of a model by hand, it
+/// is taken as it is.
+fn walk(noise: &Parameters, seconds: f64) -> Figure {
+    let k = noise.get("rate_random_walk");
+    let unseen = (seconds > 0.0).then(|| told::unseen_walk(noise, seconds));
+    match (k, unseen.flatten()) {
+        (Some(k), Some(value)) if value > 0.0 && value.is_finite() => {
+            let std_error = None;
+            let unit = k.unit.clone();
+            match figure(
+                Some(&Parameter {
+                    value,
+                    std_error,
+                    unit,
+                }),
+                &WALK,
+            ) {
+                Figure::Known(smallest) => Figure::Unseen(smallest),
+                other => other,
+            }
+        }
+        _ => figure(k, &WALK),
+    }
+}
 
 /// A fitted parameter in SI: known where it is above 0 by its 95 % interval, else at most that interval's end. In a unit that is
 /// not among `units` nothing is known.

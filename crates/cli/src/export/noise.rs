@@ -40,6 +40,8 @@ pub enum Figure {
     Known(f64),
     /// Not established; at most this.
     AtMost(f64),
+    /// Too small to be told from 0; a record of this length shows one of this size.
+    Unseen(f64),
     /// Nothing is known.
     Unknown,
 }
@@ -53,11 +55,11 @@ impl Figure {
         }
     }
 
-    /// For a filter, which has to expect it: the limit where there is no value.
+    /// For a filter, which has to expect it: where there is no value the limit, or what would just be seen.
     #[must_use]
     pub fn expected(self) -> Option<f64> {
         match self {
-            Figure::Known(value) | Figure::AtMost(value) => Some(value),
+            Figure::Known(value) | Figure::AtMost(value) | Figure::Unseen(value) => Some(value),
             Figure::Unknown => None,
         }
     }
@@ -67,7 +69,7 @@ impl Figure {
     pub fn simulated(self) -> f64 {
         match self {
             Figure::Known(value) => value,
-            Figure::AtMost(_) | Figure::Unknown => 0.0,
+            Figure::AtMost(_) | Figure::Unseen(_) | Figure::Unknown => 0.0,
         }
     }
 
@@ -76,6 +78,9 @@ impl Figure {
             Figure::Known(_) => String::new(),
             Figure::AtMost(limit) => {
                 format!("not established by this record; 95 % limit {limit:.6e}")
+            }
+            Figure::Unseen(smallest) => {
+                format!("too small to be told from 0; a record this long shows {smallest:.6e}")
             }
             Figure::Unknown => "this record says nothing about it".to_owned(),
         }

@@ -42,8 +42,9 @@ impl ImuNoise {
                     .collect();
                 let remarks: Vec<String> = axes
                     .iter()
-                    .filter(|axis| !of_axis(axis).remark().is_empty())
-                    .map(|axis| format!("{}: {}", axis.name, of_axis(axis).remark()))
+                    .map(|axis| (&axis.name, self.remark_on(name, of_axis(axis))))
+                    .filter(|(_, remark)| !remark.is_empty())
+                    .map(|(axis, remark)| format!("{axis}: {remark}"))
                     .collect();
                 let _ = writeln!(
                     out,
@@ -57,6 +58,16 @@ impl ImuNoise {
             out.push_str("    'NoiseType', 'single-sided');\n");
         }
         out
+    }
+
+    /// What stands beside a number of an axis. A model file says nothing of the flicker that it has not.
+    fn remark_on(&self, parameter: &str, of: Figure) -> String {
+        match of {
+            Figure::Unknown if self.is_after_causes && parameter == "BiasInstability" => {
+                "not in this file; `imu-stand diagnose --json` says how large it may be".to_owned()
+            }
+            _ => of.remark(),
+        }
     }
 
     /// The slopes in temperature, where there are any.
@@ -86,6 +97,11 @@ impl ImuNoise {
              A term that the record does not establish is left out. PX4's own plugin for Gazebo Classic takes N and K as they\n  \
              are in Kalibr's file. bias_mean is 0: Gazebo draws its sign at random."
         );
+        for (axes, sensor) in [(&self.gyro, "gyroscope"), (&self.acc, "accelerometer")] {
+            if axes.is_empty() {
+                let _ = writeln!(out, "  {}", self.absent(sensor).replace("--", "- -"));
+            }
+        }
         out.push_str("-->\n");
         let _ = writeln!(out, "<sensor name=\"imu\" type=\"imu\">");
         let _ = writeln!(out, "  <update_rate>{rate_hz}</update_rate>");
@@ -138,30 +154,33 @@ impl ImuNoise {
              # standard deviation b_stability: K sqrt(b_corr / 2) makes it one over times far below b_corr, ten times the record.\n\
              # A term that the record does not establish is 0. Its own `b_stability` is no flicker floor B."
         );
+        for (axes, sensor) in [(&self.gyro, "gyroscope"), (&self.acc, "accelerometer")] {
+            if axes.is_empty() {
+                let _ = writeln!(out, "# 0 below: {}", self.absent(sensor));
+            }
+        }
         out.push_str("import numpy as np\n\nimu_err = {\n");
         for (axes, name, noise, to_n, to_b) in [
             (&self.gyro, "gyro", "arw", ROOT_HOUR / DEG, 3600.0 / DEG),
             (&self.acc, "accel", "vrw", ROOT_HOUR, 1.0),
         ] {
-            let list = |of: &dyn Fn(&AxisNoise) -> f64| {
-                let values: Vec<String> = axes
-                    .iter()
-                    .map(|axis| format!("{:.6e}", of(axis)))
-                    .collect();
-                // All keys are needed, whether the record has the sensor or not.
-                if values.is_empty() {
-                    "0.0, 0.0, 0.0".to_owned()
-                } else {
-                    values.join(", ")
-                }
+            // All keys are needed, whether the record has the sensor or not.
+            let list = |none: f64, of: &dyn Fn(&AxisNoise) -> f64| {
+                let values: Vec<f64> = match axes.is_empty() {
+                    true => vec![none; 3],
+                    false => axes.iter().map(of).collect(),
+                };
+                let values: Vec<String> = values.iter().map(|v| format!("{v:.6e}")).collect();
+                values.join(", ")
             };
             let zero = vec!["0.0"; axes.len().max(3)].join(", ");
-            let n = list(&|axis| axis.white.simulated() * to_n);
-            let b = list(&|axis| match self.process(&axis.name) {
+            let n = list(0.0, &|axis| axis.white.simulated() * to_n);
+            let b = list(0.0, &|axis| match self.process(&axis.name) {
                 Some(process) => process.sigma * to_b,
                 None => axis.walk.simulated() * (corr / 2.0).sqrt() * to_b,
             });
-            let c = list(&|axis| {
+            // Its bias divides by the time: 0 would make each acceleration no number.
+            let c = list(corr, &|axis| {
                 self.process(&axis.name)
                     .map_or(corr, |p| p.correlation_time)
             });

@@ -1,5 +1,7 @@
 //! The noise of a model in words: bias, N, B and K of a channel, in the units in which `analyze` has them.
 
+use std::collections::BTreeMap;
+
 use diagnosis::result::Diagnosed;
 use model::effects::flicker;
 use model::file::ModelFile;
@@ -41,11 +43,7 @@ pub struct Term {
 pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option<Term> {
     let own = model.channels.iter().find(|c| c.name == channel)?;
     let value = usual(own.baseline.get(key)?);
-    let limit = value.value + answer::HALF_WIDTH_95 * value.std_error.unwrap_or(0.0);
-    let smallest = || smallest_walk(own.baseline.get("angle_random_walk"), seconds);
-    let has_interval = value.std_error.is_some_and(|e| e > 0.0 && e.is_finite());
-    // Without an interval what is smaller than can be seen is no estimate.
-    let unseen = || limit <= NOTHING * smallest() || !has_interval && limit < smallest();
+    let unseen = || unseen_walk(&own.baseline, seconds).is_some();
     let shown = match key {
         "bias" => Shown::Size,
         "rate_random_walk" if unseen() => Shown::Nothing,
@@ -58,6 +56,19 @@ pub fn term(model: &ModelFile, channel: &str, key: &str, seconds: f64) -> Option
         _ => answer::level(&value),
     };
     Some(Term { value, shown, said })
+}
+
+/// Of a random walk K that a record of `seconds` does not tell from none: the smallest that it would show, in the unit of K.
+/// `None` where K is told, by its size or by a limit.
+#[must_use]
+pub fn unseen_walk(noise: &BTreeMap<String, Parameter>, seconds: f64) -> Option<f64> {
+    let k = noise.get("rate_random_walk")?;
+    let smallest = smallest_walk(noise.get("angle_random_walk"), seconds);
+    let limit = k.value + answer::HALF_WIDTH_95 * k.std_error.unwrap_or(0.0);
+    let has_interval = k.std_error.is_some_and(|e| e > 0.0 && e.is_finite());
+    // Without an interval what is smaller than can be seen is no estimate.
+    let is_unseen = limit <= NOTHING * smallest || !has_interval && limit < smallest;
+    is_unseen.then_some(smallest)
 }
 
 /// The bias instability B beside the causes: its size where flicker is one of them, else the limit that follows where it is
