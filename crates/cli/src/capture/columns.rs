@@ -16,7 +16,7 @@ use super::mapped::{
 use super::names::{TIMES, in_its_place, left, not_read, other_clock, respelt, taken};
 use super::own::{own, take_counted};
 use super::preamble::Stated;
-use super::propose::{date_of, stated_time, times, unknown};
+use super::propose::{date_of, inertial, stated_time, times, unknown};
 use super::units::{COUNTS, What, convert, in_brackets};
 use super::{CaptureError, ColumnMapping};
 
@@ -110,6 +110,9 @@ pub(super) fn columns(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Column
         // A misspelt key of `--units` leaves the cells as counts.
         let stems = said.names.iter().map(|name| in_brackets(name).0);
         mapping.check_units(stems)?;
+        if mapping.columns.is_empty() && has_foreign_gyros(said) {
+            return Err(unknown(said.names, FOREIGN_GYROS.to_owned()));
+        }
     }
     let found = found?;
     if !mapping.columns.is_empty() && !found.columns.iter().any(is_measured) {
@@ -178,6 +181,15 @@ fn chosen(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, CaptureEr
             None => by_our_names(said, mapping)?,
         }
     })
+}
+
+/// Whether a file that is no capture of the stand has gyros, none by a name of ours: beside those, what has a name of ours is
+/// most probably in units too, and no key of the header is missing.
+fn has_foreign_gyros(said: &Said<'_>) -> bool {
+    let is_ours = |name: &String| meaning(in_brackets(name).0).0 == Quantity::Gyro;
+    said.lines.get("format").is_none()
+        && !said.names.iter().any(is_ours)
+        && inertial(said.names).contains(&Some(Quantity::Gyro))
 }
 
 /// Refuses a name that two columns have, where it was not its number that chose one of them.
@@ -273,14 +285,13 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     let is_scaled = said.is_scaled
         || inertial
             .any(|at| unit(at, What::Channel(meaning(stem(at)).0)).is_some_and(|u| u != COUNTS));
+    let is_export = is_export(said, &names)?;
     // Where nothing says a unit, cells are counts, and so they are in columns of which the file says it.
     let is_counted = |unit: Option<&str>| unit == Some(COUNTS) || (unit.is_none() && !is_scaled);
     let has = |name: &str| names.iter().any(|n| n == name);
     // `export` tells the board's time once more, in s.
     let has_ticks =
         mapping.columns.is_empty() && has("t_ticks") && said.lines.get("tick_s").is_some();
-    // It says the unit of every column.
-    let is_export = has("time_s") && said.names.iter().all(|n| said.lines.unit_of(n).is_some());
     let other_time = other_time(said, &names);
     let mut found = Columns {
         notes,
@@ -359,6 +370,21 @@ fn by_our_names(said: &Said<'_>, mapping: &ColumnMapping) -> Result<Columns, Cap
     Ok(found)
 }
 
+/// Whether `export` wrote it: it says the unit of every column.
+///
+/// # Errors
+/// Where it did not, and no gyro or accelerometer has a name of ours: before a key of the header is missed that a thermometer of
+/// others never had.
+fn is_export(said: &Said<'_>, names: &[String]) -> Result<bool, CaptureError> {
+    let is_own = |name: &String| matches!(meaning(name).0, Quantity::Gyro | Quantity::Acc);
+    let is_export = names.iter().any(|name| name == "time_s")
+        && said.names.iter().all(|n| said.lines.unit_of(n).is_some());
+    match is_export || names.iter().any(is_own) {
+        true => Ok(is_export),
+        false => Err(unknown(said.names, NONE_OF_OURS.to_owned())),
+    }
+}
+
 /// The one column that calls itself a time, though by no name of ours.
 fn other_time(said: &Said<'_>, names: &[String]) -> Option<usize> {
     let is_time = |name: &str| TIMES.contains(&name) || matches!(name, "host_time_s" | "t_ticks");
@@ -393,6 +419,9 @@ fn exported(at: usize, name: &str, unit: &str) -> Column {
 
 pub(super) const NONE_OF_OURS: &str =
     "no column has a name of the stand's captures (gyro_x, acc_x, ...)";
+
+const FOREIGN_GYROS: &str =
+    "the gyros have other names than the stand's, and nothing says in what units the columns are";
 
 /// The time column at a place, in the unit that is given, stated or usual.
 pub(super) fn time(

@@ -199,3 +199,34 @@ fn where_a_column_is_not_there_the_proposal_is_of_what_was_asked() {
         "{said}"
     );
 }
+
+#[test]
+fn foreign_gyros_beside_names_of_ours_get_a_proposal_that_works() {
+    for (names, beside) in [
+        ("temp", "temp"),
+        ("temp_x", "temp"),
+        ("supply", ""),
+        ("acc_x,acc_y,acc_z", "acc_z"),
+    ] {
+        let rest = ",1.5".repeat(names.split(',').count());
+        let mut text = format!("time,gx,gy,gz,{names}\n");
+        for k in 0..20 {
+            text += &format!("{},0.{k},0.{},0.25{rest}\n", 0.05 * f64::from(k), k + 1);
+        }
+        let said = error(text.as_bytes(), "", "");
+        // Of a file of others no key is missing.
+        assert!(!said.contains("lacks the key"), "{said}");
+        let (_, line) = said.split_once("--columns ").expect("a proposal");
+        let (columns, units) = line.split_once(" --units ").expect("units");
+        assert!(columns.starts_with("time=time,gyro_x=gx,"), "{line}");
+        let units = units
+            .replace("gyro=UNIT", "gyro=deg/s")
+            .replace("acc=UNIT", "acc=g")
+            .replace("temp=UNIT", "temp=degC");
+        let read = read(text.as_bytes(), columns, &units).expect(line).record;
+        assert!((read.channel("gyro_y").expect("a gyro").values[3] - 0.4).abs() < 1e-12);
+        if !beside.is_empty() {
+            assert!(read.channel(beside).is_some(), "{line}");
+        }
+    }
+}
