@@ -1,15 +1,13 @@
 //! How long to record for an answer that is missing: `imu-stand-plan/1`.
 
+mod record;
 mod separate;
 mod sequences;
 mod wish;
 
 use miette::Result;
 use model::ModelFile;
-use model::record::sampling::Sampling;
-use model::record::{Channel, Quantity, Record};
-use noise::analyze::misfit_warning;
-use noise::fit::{Described, Spectrum, Term, fit, fit_described};
+use noise::fit::{Spectrum, Term, fit};
 use noise::plan::{KnownNoise, Letter, seconds_for};
 use noise::synthetic::Truth;
 use rand_core::SeedableRng;
@@ -17,7 +15,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::explain::explain;
-use crate::report::plot::number;
+pub use record::of_record;
 pub use separate::{Told, lengths};
 pub use sequences::{SEQUENCES, Sequence, tells_apart};
 pub use wish::{WantedAngle, Wish, Z_95, wishes};
@@ -269,119 +267,6 @@ pub fn of_model(
         notes: Vec::new(),
         limits: [0.0; 5],
     })
-}
-
-/// The gyro of that name, or the first one.
-fn gyro_of<'a>(record: &'a Record, from: &str, channel: Option<&str>) -> Result<&'a Channel> {
-    record
-        .channels
-        .iter()
-        .find(|c| match channel {
-            Some(name) => c.name == name,
-            None => c.quantity == Quantity::Gyro,
-        })
-        .ok_or_else(|| {
-            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
-            miette::miette!(
-                help = "`--channel NAME` names one, `--columns` maps a foreign file",
-                "{} has no such gyro; it has {}",
-                from,
-                names.join(", ")
-            )
-        })
-}
-
-/// What a record tells of the noise of a gyro: of the one of that name, or of the first.
-///
-/// # Errors
-/// Where it has no such gyro, no rate, or too few samples.
-pub fn of_record(
-    record: &Record,
-    from: &str,
-    channel: Option<&str>,
-    rate_hz: Option<f64>,
-    seed: u64,
-) -> Result<Noise> {
-    let gyro = gyro_of(record, from, channel)?;
-    let sampling = Sampling::of(record, rate_hz).map_err(explain)?;
-    let described = described(gyro, &sampling, seed)?;
-    Ok(Noise {
-        from: format!("{}, {}", from, gyro.name),
-        ..noise_of(&described, sampling.tau0)
-    })
-}
-
-/// The terms that describe the noise of a gyro.
-fn described(gyro: &Channel, sampling: &Sampling, seed: u64) -> Result<Described> {
-    let runs = sampling.runs_of(&gyro.values);
-    let spectrum = Spectrum::with_gaps(&gyro.values, &runs, &sampling.slots, sampling.tau0);
-    let samples: usize = runs.iter().map(ExactSizeIterator::len).sum();
-    if samples < LEAST_SAMPLES {
-        return Err(explain(model::record::AnalysisError::Inconclusive {
-            what: format!("a plan by the noise of {}", gyro.name),
-            have: samples as f64,
-            need: LEAST_SAMPLES as f64,
-            unit: "samples",
-        }));
-    }
-    let longest = runs.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    Ok(fit_described(&spectrum, longest / 5, &mut rng))
-}
-
-/// The noise to plan by, with notes on what is assumed of terms that are not established; steps are `tau0` s apart.
-fn noise_of(described: &Described, tau0: f64) -> Noise {
-    let found = &described.fit;
-    let mut notes = Vec::new();
-    notes.extend(misfit_warning(described, tau0));
-    let estimates = [
-        found.term(Term::White),
-        found.term(Term::Flicker),
-        found.term(Term::RandomWalk),
-        found.term(Term::Quantization),
-        found.rate_ramp,
-    ];
-    let limits = estimates.map(|e| if e.value.is_none() { e.high } else { 0.0 });
-    let mut absent = vec![];
-    let mut value = |name: &str, (scale, unit): (f64, &str), e: noise::fit::Estimated| {
-        e.value.unwrap_or_else(|| {
-            absent.push(format!(
-                "{name} (at most {} {unit})",
-                number(scale * e.high, 3)
-            ));
-            0.0
-        })
-    };
-    let white = found.term(Term::White);
-    // No gyro is without it: of what is not known, the worst.
-    let n = white.value.unwrap_or(white.high);
-    let b = value("B", (3600.0, "deg/h"), found.term(Term::Flicker));
-    let k = value("K", (1.0, "deg/s/sqrt(s)"), found.term(Term::RandomWalk));
-    let q = value("Q", (1.0, "deg"), found.term(Term::Quantization));
-    let r = value("R", (1.0, "deg/s^2"), found.rate_ramp);
-    if !absent.is_empty() {
-        notes.push(format!(
-            "not established in this capture, and planned as absent: {}",
-            absent.join(", ")
-        ));
-    }
-    if white.value.is_none() {
-        notes.push(format!(
-            "N is not established in this capture: planned at its limit, {} deg/sqrt(h)",
-            number(60.0 * n, 3)
-        ));
-    }
-    Noise {
-        from: String::new(),
-        rate_hz: 1.0 / tau0,
-        n,
-        b,
-        k,
-        q,
-        r,
-        notes,
-        limits,
-    }
 }
 
 /// The length, s, from `seconds` on, in steps, of which enough records keep to what is wanted, or the longest that is not too
