@@ -205,3 +205,25 @@ fn a_reader_that_has_had_enough_costs_no_file() {
         std::fs::remove_file(folder.join("out.json")).expect("a file");
     }
 }
+
+#[test]
+fn a_report_is_not_written_under_a_name_that_lies() {
+    let folder = folder("lies");
+    for (line, help) in [
+        ("report run.csv --out r.pdf", "--pdf report.pdf"),
+        ("report run.csv --out r.txt", "--details"),
+        ("diagnose run.csv --report r.PDF", "--pdf report.pdf"),
+        ("report run.csv --pdf r.html", "name it .pdf"),
+    ] {
+        let output = run(&folder, line);
+        let said = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+        assert_eq!(output.status.code(), Some(2), "{line}: {said}");
+        assert!(
+            said.contains(help) && said.contains("what its name says"),
+            "{line}: {said}"
+        );
+    }
+    for name in ["r.pdf", "r.txt", "r.PDF", "r.html"] {
+        assert!(!folder.join(name).exists(), "{name}");
+    }
+}

@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Outputs::beside(&captures)
         .result("--json", arguments.json.as_ref())?
         .result("--model-out", arguments.model_out.as_ref())?
-        .result("--report", arguments.report.as_ref())?;
+        .page("--report", arguments.report.as_ref())?;
     match captures.as_slice() {
         [one] => alone(arguments, one),
         all => several(arguments, all),

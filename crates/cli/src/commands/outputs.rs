@@ -38,6 +38,54 @@ const DATA: [&str; 16] = [
 /// Endings that promise another form of table than the text that a capture is.
 const OTHER_TABLES: [&str; 7] = ["npz", "npy", "parquet", "pq", "mat", "h5", "hdf5"];
 
+/// Endings of a page, and those that promise another form of document.
+const PAGE: [&str; 3] = ["html", "htm", "xhtml"];
+const OTHER_DOCUMENTS: [&str; 18] = [
+    "pdf", "txt", "text", "md", "json", "csv", "toml", "yaml", "yml", "xml", "svg", "png", "jpg",
+    "doc", "docx", "odt", "rtf", "tex",
+];
+
+/// Refuses to write a page to a file whose name says that it is something else.
+pub fn named_as_page(option: &str, path: Option<&PathBuf>) -> Result<()> {
+    let ending = path.map(|path| ending(path)).unwrap_or_default();
+    let help = match ending.as_str() {
+        "pdf" => {
+            "`imu-stand report CAPTURE --pdf report.pdf` prints one, beside the page, with Chromium, Chrome or Edge"
+        }
+        "txt" | "text" | "md" => {
+            "name it .html; `imu-stand diagnose CAPTURE --details` prints the answers as text"
+        }
+        "json" => "name it .html; `imu-stand diagnose CAPTURE --json FILE` writes JSON",
+        _ => "name it .html",
+    };
+    if let Some(path) = path.filter(|_| OTHER_DOCUMENTS.contains(&ending.as_str())) {
+        misused!(
+            help = help,
+            "{option}: {}: a report is a page of HTML, and would not be what its name says",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Refuses to print a PDF to a file whose name says that it is the page.
+pub fn named_as_pdf(option: &str, path: Option<&PathBuf>) -> Result<()> {
+    if let Some(path) = path.filter(|path| PAGE.contains(&ending(path).as_str())) {
+        misused!(
+            help = "name it .pdf; `--out` names the page",
+            "{option}: {}: it writes a PDF, and would not be what its name says",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// How a name ends, in small letters, without the dot.
+fn ending(path: &Path) -> String {
+    let ending = path.extension().and_then(|ending| ending.to_str());
+    ending.map(str::to_ascii_lowercase).unwrap_or_default()
+}
+
 /// Refuses an output in a folder that is not there.
 pub fn has_folder(option: &str, path: &Path) -> Result<()> {
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
@@ -53,9 +101,7 @@ pub fn has_folder(option: &str, path: &Path) -> Result<()> {
 
 /// Refuses to write a capture, which is CSV, to a file whose name says that it is something else.
 pub fn named_as_text(option: &str, path: &Path) -> Result<()> {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    let ending = ending.map(str::to_ascii_lowercase).unwrap_or_default();
-    if OTHER_TABLES.contains(&ending.as_str()) {
+    if OTHER_TABLES.contains(&ending(path).as_str()) {
         misused!(
             help = "name it .csv or .csv.gz; `imu-stand export run.csv --out run.npz` (or .parquet) makes another form of it",
             "{option}: {}: a capture is CSV, and would not be what its name says",
@@ -81,6 +127,12 @@ impl Outputs {
             return Err(refused(option, path, "holds data"));
         }
         Ok(self)
+    }
+
+    /// A report, one page of HTML.
+    pub fn page(self, option: &'static str, path: Option<&PathBuf>) -> Result<Self> {
+        named_as_page(option, path)?;
+        self.result(option, path)
     }
 
     /// Data in another form.

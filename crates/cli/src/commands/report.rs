@@ -40,8 +40,9 @@ pub struct Arguments {
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.capture])
-        .result("--out", Some(&arguments.out))?
+        .page("--out", Some(&arguments.out))?
         .result("--pdf", arguments.pdf.as_ref())?;
+    super::outputs::named_as_pdf("--pdf", arguments.pdf.as_ref())?;
     if let Some(folder) = arguments.figures.as_ref().filter(|f| f.exists()) {
         miette::ensure!(
             folder.is_dir(),

@@ -240,7 +240,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .simulated("--out", Some(&arguments.out))?
         .result("--analysis", arguments.analysis.as_ref())?
         .result("--json", arguments.json.as_ref())?
-        .result("--report", arguments.report.as_ref())?
+        .page("--report", arguments.report.as_ref())?
         .result("--vcd", arguments.vcd.as_ref())?;
     let plan = planned(arguments)?;
     let bar = progress(arguments);
