@@ -227,3 +227,16 @@ fn a_report_is_not_written_under_a_name_that_lies() {
         assert!(!folder.join(name).exists(), "{name}");
     }
 }
+
+#[test]
+fn what_holds_no_sample_leaves_nothing_behind() {
+    let folder = folder("replay");
+    let output = run(&folder, "capture --replay run.csv --out q.csv");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("holds no sample") && said.contains("name the .raw file"),
+        "{said}"
+    );
+    assert!(!folder.join("q.csv").exists());
+}

@@ -12,15 +12,16 @@ use super::{Answer, Arguments, Lost};
 /// Makes a capture of raw bytes. They carry no time of arrival: host times are the device's, from the first sample on.
 pub fn replay(arguments: &Arguments, path: &Path) -> Result<()> {
     let (frames, decoder, stats) = decoded(path)?;
-    let written = Written::of(arguments, path, &frames)?;
-    if written.rows == 0 {
+    // Before a file is made: one without rows would stand in the way of the right bytes.
+    if !frames.iter().any(|frame| matches!(frame, Frame::Sample(_))) {
         miette::bail!(
-            help = "is it the .raw file of a capture?",
+            help = "name the .raw file of a capture, which stands beside its .csv; nothing was written",
             "{} holds no sample: {}",
             path.display(),
             imu_stand::text::link(decoder.counts())
         );
     }
+    let written = Written::of(arguments, path, &frames)?;
     let losses = stats.losses();
     let names = written.files.iter().map(|file| super::super::name(file));
     let answer = Answer {
