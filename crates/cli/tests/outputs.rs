@@ -240,3 +240,20 @@ fn what_holds_no_sample_leaves_nothing_behind() {
     );
     assert!(!folder.join("q.csv").exists());
 }
+
+#[test]
+fn a_capture_in_place_of_a_model_is_told_as_such() {
+    let folder = folder("model");
+    for line in [
+        "simulate --model run.csv --out x.csv",
+        "plan --model run.csv --want K",
+        "run --native --model run.csv --out x.csv",
+    ] {
+        let output = run(&folder, line);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            said.contains("is no model file") && said.contains("--model-out"),
+            "{line}: {said}"
+        );
+    }
+}

@@ -96,7 +96,7 @@ const SENS_AVG: u16 = 0x0402;
 
 fn board(arguments: &Arguments) -> Result<()> {
     Outputs::beside([&arguments.file]).result("--out", arguments.out.as_ref())?;
-    let mut model = export_source::model(&arguments.file)?;
+    let mut model = super::read_model(&arguments.file)?;
     let refused = keep_what_is_more_than_its_error(&mut model);
     let mut board = BoardCorrection::of(&model, SENS_AVG).map_err(|error| {
         miette::miette!(

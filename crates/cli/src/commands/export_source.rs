@@ -6,7 +6,7 @@ use std::path::Path;
 use diagnosis::result::{DIAGNOSIS_FORMAT, Diagnosis};
 use imu_stand::export::noise::ImuNoise;
 use miette::Result;
-use model::file::{FORMAT as MODEL_FORMAT, ModelFile};
+use model::file::FORMAT as MODEL_FORMAT;
 use noise::analyze::{ANALYSIS_FORMAT, Analysis};
 use serde::Deserialize;
 
@@ -46,8 +46,8 @@ fn is_model(start: &[u8]) -> bool {
     start.split(|b| *b == b'\n').any(is_toml) && contains(start, MODEL_FORMAT.as_bytes())
 }
 
-/// A model; what is none says how one is made.
-pub fn model(path: &Path) -> Result<ModelFile> {
+/// Refuses a file that begins as no model does, and says how one is made.
+pub fn has_model(path: &Path) -> Result<()> {
     let start = start_of(path);
     if !start.is_empty() && !is_model(&start) {
         miette::bail!(
@@ -56,7 +56,7 @@ pub fn model(path: &Path) -> Result<ModelFile> {
             path.display()
         );
     }
-    super::read_model(path)
+    Ok(())
 }
 
 /// What a file is, by how it begins; its content where that is no capture.

@@ -364,8 +364,9 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-/// Reads a model file.
+/// Reads a model file; what is none says how one is made.
 pub fn read_model(path: &Path) -> Result<model::ModelFile> {
+    export_source::has_model(path)?;
     model::ModelFile::parse(&read_text(path)?).map_err(|error| {
         miette::miette!(
             help = "docs/model-file.md lists keys, effects and units",
