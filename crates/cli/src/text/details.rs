@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use diagnosis::result::{DetectionLimit, Diagnosis, Finding, Gain, Unexplained};
 
-use super::{answer, item};
+use super::{WIDTH, answer, item};
 use crate::report::plot::{fixed, number, tidy};
 
 /// The details of a diagnosis.
@@ -123,21 +123,35 @@ fn write_limits(out: &mut String, d: &Diagnosis) {
     }
     channels.sort_unstable();
     let title = "smallest size that this run would have found";
-    let _ = write!(out, "\n{title:<52}");
-    for channel in &channels {
-        let _ = write!(out, " {channel:>8}");
-    }
-    let _ = writeln!(out);
-    for (what, at, cells) in rows {
-        let mut line = format!("    {what:<48}");
-        for channel in &channels {
-            let cell = cells.iter().find(|(name, _)| name == channel);
-            let text = cell.map_or_else(|| "-".to_owned(), |(_, value)| short(*value));
-            let _ = write!(line, " {text:>8}");
+    // As many channels side by side as a terminal has place for.
+    for group in channels.chunks(SIDE_BY_SIDE) {
+        let _ = write!(out, "\n{title:<52}");
+        for channel in group {
+            let _ = write!(out, " {channel:>8}");
         }
-        let _ = writeln!(out, "{line}{at}");
+        let _ = writeln!(out);
+        let is_here = |(.., cells): &&LimitRow<'_>| cells.iter().any(|(c, _)| group.contains(c));
+        for (what, at, cells) in rows.iter().filter(is_here) {
+            let mut line = format!("    {what:<48}");
+            for channel in group {
+                let cell = cells.iter().find(|(name, _)| name == channel);
+                let text = cell.map_or_else(|| "-".to_owned(), |(_, value)| short(*value));
+                let _ = write!(line, " {text:>8}");
+            }
+            match line.chars().count() + at.chars().count() > WIDTH {
+                true => {
+                    let _ = writeln!(out, "{line}\n{}", item("  ", at.trim_start()));
+                }
+                false => {
+                    let _ = writeln!(out, "{line}{at}");
+                }
+            }
+        }
     }
 }
+
+/// Channels of one table of limits.
+const SIDE_BY_SIDE: usize = 3;
 
 /// The other parameters at which a limit holds, as `  at frequency 5.0 Hz`; nothing where there are none.
 pub fn held_at(limit: &DetectionLimit) -> String {
@@ -167,12 +181,12 @@ fn short(value: f64) -> String {
 }
 
 fn write_finding(out: &mut String, finding: &Finding) {
-    let _ = writeln!(
-        out,
-        "\n{} on {}: parameters with their standard errors, and gain",
+    let title = format!(
+        "{} on {}: parameters with their standard errors, and gain",
         finding.cause,
         finding.channels.join(", ")
     );
+    let _ = writeln!(out, "\n{}", item("", &title).trim_start());
     for (name, parameter) in &finding.parameters {
         let size = measured(parameter.value, parameter.std_error);
         let unit = match parameter.unit.as_str() {
@@ -302,6 +316,36 @@ fn slow_noise(d: &Diagnosis) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_table_of_limits_is_no_wider_than_a_terminal() {
+        let limits = ["acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z"].map(|channel| {
+            serde_json::json!({
+                "cause": "line", "channel": channel, "parameter": "amplitude", "value": 0.0123, "unit": "deg/s",
+                "at": {"frequency": {"value": 5.0, "std_error": null, "unit": "Hz"}}
+            })
+        });
+        let names = ["gyro_x", "gyro_y", "gyro_z"];
+        let d = serde_json::json!({
+            "format": "", "input": {"file": "", "seconds": 1.0, "rate_hz": 1.0, "samples": 1, "channels": []},
+            "baseline": {}, "checks": [], "unexplained": [], "not_tested": [], "verdict": "adequate",
+            "detection_limits": limits,
+            "findings": [{
+                "cause": "common_noise", "channels": names, "parameters": {}, "alternatives": [],
+                "experiment": null, "gain": null
+            }]
+        });
+        let text = super::details(&serde_json::from_value(d).expect("a diagnosis"));
+        assert!(
+            text.lines()
+                .all(|line| line.chars().count() <= super::WIDTH),
+            "{text}"
+        );
+        assert!(text.contains("at frequency 5.0 Hz"), "{text}");
+        for channel in names {
+            assert!(text.contains(channel), "{text}");
+        }
+    }
+
     #[test]
     fn figures_end_where_their_error_does_whatever_their_size() {
         for (value, error, shown) in [

@@ -206,7 +206,7 @@ fn write_noise(out: &mut String, of: &Diagnosed) {
         ];
         for (letter, text) in terms {
             if let Some(text) = text {
-                let _ = writeln!(out, "    {name}  {letter} {}", text.replace('\u{a0}', " "));
+                let _ = writeln!(out, "{}", item(&format!("{name}  {letter} "), &text));
             }
         }
     }

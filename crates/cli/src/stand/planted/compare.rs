@@ -6,7 +6,7 @@ use diagnosis::result::{Diagnosis, Finding, Parameter};
 use serde::Serialize;
 
 use super::{Planted, Size};
-use crate::text::{measured, rounded_as};
+use crate::text::{item, measured, rounded_as};
 
 /// Standard errors on either side of an estimate that hold the truth 95 times of 100.
 const NORMAL_95: f64 = 1.96;
@@ -195,6 +195,19 @@ impl Comparison {
     }
 }
 
+impl Comparison {
+    /// The same for a terminal, wrapped.
+    #[must_use]
+    pub fn wrapped(&self) -> String {
+        let lines = self.lines();
+        let wrapped = lines.iter().map(|line| {
+            let text = line.trim_start();
+            item(&line[..line.len() - text.len()], text)
+        });
+        wrapped.collect::<Vec<_>>().join("\n")
+    }
+}
+
 impl Compared {
     fn lines(&self) -> Vec<String> {
         let place = match self.channels.as_slice() {
@@ -245,12 +258,12 @@ impl Compared {
             let _ = write!(line, "{unit}, {name}");
             return line;
         };
-        let found_as = match size.effective {
-            true => "effective for this excitation",
-            false => "found",
-        };
         let found_is = measured(found, size.std_error);
-        let _ = write!(line, ", {found_as} {found_is}{unit}: ");
+        let effective = match size.effective {
+            true => ", effective for this excitation",
+            false => "",
+        };
+        let _ = write!(line, ", found {found_is}{unit}{effective}: ");
         let apart = (found - size.planted).abs();
         line += &match (size.matches, size.std_error) {
             (Some(true), _) => "match".to_owned(),

@@ -399,11 +399,7 @@ impl Loop<'_> {
             return;
         }
         if let Some(comparison) = &answer.planted {
-            say!("planted and found");
-            comparison
-                .lines()
-                .iter()
-                .for_each(|line| say!("    {line}"));
+            say!("planted and found\n{}", comparison.wrapped());
         }
         answer.lines().iter().for_each(|line| say!("{line}"));
     }
