@@ -11,6 +11,7 @@ use noise::AnalyzeOptions;
 use noise::allan::{Deviation, TauGrid};
 use noise::analyze::{Analysis, ChannelAnalysis, Interval, NoiseParameters};
 
+use super::progress::working;
 use super::{Input, Outputs};
 
 /// What `analyze` takes.
@@ -52,7 +53,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         seed: arguments.seed,
         file: super::name(&arguments.capture),
     };
-    let analysis = noise::analyze(&read.record, &options).map_err(super::explain)?;
+    let say = || format!("analyzing {}", options.file);
+    let analysis = working(arguments.input.quiet, say, || {
+        noise::analyze(&read.record, &options)
+    });
+    let analysis = analysis.map_err(super::explain)?;
     super::write_json(arguments.json.as_ref(), &analysis)?;
     if !arguments.input.quiet {
         print(&analysis, arguments.paper);

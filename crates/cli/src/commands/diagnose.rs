@@ -11,6 +11,7 @@ use miette::Result;
 use model::record::{Base, Record};
 use serde::Serialize;
 
+use super::progress::working;
 use super::{Input, Outputs, Replicates, many};
 
 /// What `diagnose` takes.
@@ -105,13 +106,16 @@ fn found(arguments: &Arguments, path: &Path, is_needed: bool) -> Result<Found> {
         replicates: arguments.replicates.count(),
         matters: arguments.replicates.matters(),
     };
-    let diagnosed = if let Some(channels) = &arguments.channels {
-        diagnosis::diagnose_channels(&record, channels, &options)
-    } else if is_needed {
-        diagnosis::diagnose(&record, &options)
-    } else {
-        diagnosis::diagnose_owned(std::mem::take(&mut record), &options)
-    };
+    let say = || format!("diagnosing {}", options.file);
+    let diagnosed = working(arguments.input.quiet, say, || {
+        if let Some(channels) = &arguments.channels {
+            diagnosis::diagnose_channels(&record, channels, &options)
+        } else if is_needed {
+            diagnosis::diagnose(&record, &options)
+        } else {
+            diagnosis::diagnose_owned(std::mem::take(&mut record), &options)
+        }
+    });
     Ok(Found {
         record,
         base,

@@ -15,6 +15,7 @@ use noise::analyze::Analysis;
 use super::Input;
 use super::export_source::{self, Source};
 use super::outputs::{self, Outputs};
+use super::progress::working;
 
 /// Into what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -290,5 +291,9 @@ fn analyzed(
         file: super::name(path),
         ..AnalyzeOptions::default()
     };
-    noise::analyze(&read.record, &options).map_err(super::explain)
+    let say = || format!("analyzing {}", options.file);
+    let analysis = working(arguments.input.quiet, say, || {
+        noise::analyze(&read.record, &options)
+    });
+    analysis.map_err(super::explain)
 }

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{Result, miette};
 
+use super::progress::beside_bar;
+
 /// Endings of captures, packed or not.
 const CAPTURES: [&str; 11] = [
     "csv", "txt", "npz", "npy", "parquet", "pq", "mat", "h5", "hdf5", "mcap", "bag",
@@ -74,22 +76,26 @@ pub fn in_parallel<T: Send>(
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Option<T>>> = all.iter().map(|_| Mutex::new(None)).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(all.len()) {
-            scope.spawn(|| {
-                while let Some((path, slot)) = {
-                    let k = next.fetch_add(1, Ordering::Relaxed);
-                    all.get(k).zip(done.get(k))
-                } {
-                    let made = work(path);
-                    if let Ok(mut slot) = slot.lock() {
-                        *slot = Some(made);
+    let say = || format!("captures: {} of {} done", bar.position(), all.len());
+    let side_by_side = || {
+        std::thread::scope(|scope| {
+            for _ in 0..threads.min(all.len()) {
+                scope.spawn(|| {
+                    while let Some((path, slot)) = {
+                        let k = next.fetch_add(1, Ordering::Relaxed);
+                        all.get(k).zip(done.get(k))
+                    } {
+                        let made = work(path);
+                        if let Ok(mut slot) = slot.lock() {
+                            *slot = Some(made);
+                        }
+                        bar.inc(1);
                     }
-                    bar.inc(1);
-                }
-            });
-        }
-    });
+                });
+            }
+        })
+    };
+    beside_bar(is_quiet, say, side_by_side);
     bar.finish_and_clear();
     let made = done.into_iter().filter_map(|slot| slot.into_inner().ok());
     made.flatten().collect()

@@ -13,6 +13,7 @@ pub mod monitor;
 pub mod outputs;
 pub mod paper;
 pub mod plan;
+mod progress;
 pub mod report;
 pub mod representative;
 pub mod run;
@@ -147,19 +148,8 @@ impl Input {
             base: self.base.map(Into::into),
         };
         let path = &log_of(path).map_err(|error| not_read(error, path))?;
-        let read = if path.is_dir() {
-            joined(path).and_then(|(text, _)| read_from(text, &options))
-        } else if path.as_os_str() == outputs::DASH {
-            unpacked(stdin()?).map_or_else(
-                |source| {
-                    let path = PathBuf::from(STDIN);
-                    Err(CaptureError::Io { path, source })
-                },
-                |text| read_from(text, &options),
-            )
-        } else {
-            read_capture(path, &options)
-        };
+        let say = || format!("reading {}", name(path));
+        let read = progress::working(self.quiet, say, || read_by(path, &options))?;
         let read = read.and_then(|read| match self.corrected {
             true => Ok(Read {
                 record: corrected(read.record)?,
@@ -191,6 +181,23 @@ impl Input {
             warn!("{}: {note}", path.display());
         }
     }
+}
+
+/// A file, the files of a folder, or standard input, read.
+fn read_by(path: &Path, options: &ReadOptions) -> Result<std::result::Result<Read, CaptureError>> {
+    Ok(if path.is_dir() {
+        joined(path).and_then(|(text, _)| read_from(text, options))
+    } else if path.as_os_str() == outputs::DASH {
+        unpacked(stdin()?).map_or_else(
+            |source| {
+                let path = PathBuf::from(STDIN);
+                Err(CaptureError::Io { path, source })
+            },
+            |text| read_from(text, options),
+        )
+    } else {
+        read_capture(path, options)
+    })
 }
 
 /// A capture that cannot be read, with its name where the error has none.

@@ -9,6 +9,7 @@ use imu_stand::report::{Subject, figure_files, report, standalone};
 use imu_stand::text::shell_word;
 use miette::Result;
 
+use super::progress::working;
 use super::{Input, Outputs, Replicates};
 
 /// What `report` takes.
@@ -70,7 +71,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         replicates: arguments.replicates.count(),
         matters: arguments.replicates.matters(),
     };
-    let diagnosed = diagnosis::diagnose(&read.record, &options).map_err(super::explain)?;
+    let say = || format!("diagnosing {}", options.file);
+    let diagnosed = working(arguments.input.quiet, say, || {
+        diagnosis::diagnose(&read.record, &options)
+    });
+    let diagnosed = diagnosed.map_err(super::explain)?;
     let subject = Subject {
         record: &read.record,
         diagnosed: &diagnosed,
@@ -123,7 +128,8 @@ fn write_figures(
 
 /// Makes a report, writes it and returns it.
 pub fn write(path: &Path, subject: &Subject<'_>, quiet: bool) -> Result<String> {
-    let page = report(subject).map_err(|error| {
+    let page = working(quiet, || "making the report".to_owned(), || report(subject));
+    let page = page.map_err(|error| {
         miette::miette!(
             help = "`imu-stand diagnose` without a report gives the same answers as text and JSON",
             "no report: {error}"

@@ -1,5 +1,6 @@
 //! `imu-stand run`.
 
+mod asked;
 mod correct;
 mod pose;
 mod times;
@@ -11,12 +12,12 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
+use asked::{by_hand, length, longest};
 use clap::Args;
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
-use imu_stand::report::plot::tidy;
 use imu_stand::stand::planted::{
     ACCELEROMETERS, Comparison, GYROS, Planted, RULE, compare, planted,
 };
@@ -33,6 +34,7 @@ use times::{Held, Span, held, span};
 use wire::LinkCounts;
 
 use super::outputs::{self, Outputs};
+use super::progress::{beside_bar, working};
 use super::{Line, Replicates};
 
 /// What `run` takes.
@@ -127,70 +129,6 @@ pub struct Arguments {
     line: Line,
 }
 
-/// Shortest run that is analyzed and diagnosed, s: a shorter one leaves most causes untested.
-const SHORTEST_S: f64 = 60.0;
-
-/// Longest run, s: a day.
-const LONGEST_S: f64 = 86_400.0;
-
-/// Refuses what somebody does by hand to a stand that nobody is at, and what belongs to a loop that is not closed. Not by
-/// clap's `requires`, which says no reason, and nothing at all beside an option that the required one excludes.
-fn by_hand(arguments: &Arguments) -> Result<()> {
-    let by_hand = [
-        ("--pose", arguments.pose.is_some()),
-        ("--belt", arguments.belt != 0.0),
-        ("--stop", !arguments.stop.is_empty()),
-    ];
-    if let Some((option, _)) = by_hand.iter().find(|(_, is_given)| *is_given) {
-        misused!(
-            help = "serve the board, and record it from another terminal: `imu-stand run --pty --belt 0.004 --stop 20,25`, then \
-                    `imu-stand capture --port PORT --duty 120 --out capture.csv` with the PORT that it prints",
-            "{option} goes with --pty: without it nobody is at the stand, and what is hidden has a course of its own"
-        );
-    }
-    let of_loop = [
-        ("--correct-by", arguments.correct_by.is_some()),
-        ("--longest", arguments.longest.is_some()),
-    ];
-    if let Some((option, _)) = of_loop
-        .iter()
-        .find(|(_, is_given)| *is_given && !arguments.correct)
-    {
-        misused!(
-            help = "add `--correct`, without --analysis, --report and --details, which are of one record",
-            "{option} goes with --correct, which closes the loop"
-        );
-    }
-    Ok(())
-}
-
-/// Whether a run of so many seconds can be answered.
-fn length(seconds: f64) -> Result<()> {
-    let help = if seconds > LONGEST_S {
-        "a run lasts a day at the most: `--seconds 86400`"
-    } else {
-        "a run is analyzed and diagnosed, and a record under a minute is too short for that: `--seconds 60` is the \
-         shortest, 600 the usual length; with --pty any length is served"
-    };
-    if !(SHORTEST_S..=LONGEST_S).contains(&seconds) {
-        misused!(
-            help = help,
-            "--seconds: {} s is not within {SHORTEST_S} .. {LONGEST_S} s",
-            tidy(seconds, 6)
-        );
-    }
-    Ok(())
-}
-
-/// A length of the first record, s.
-fn longest(text: &str) -> std::result::Result<f64, String> {
-    let seconds = text
-        .parse()
-        .ok()
-        .filter(|s| (SHORTEST_S..=LONGEST_S).contains(s));
-    seconds.ok_or_else(|| format!("takes a length within {SHORTEST_S} .. {LONGEST_S} s"))
-}
-
 /// Where `cargo xtask image` puts it.
 pub const IMAGE: &str = "target/avr/avr-none/firmware/firmware.elf";
 
@@ -244,8 +182,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .result("--vcd", arguments.vcd.as_ref())?;
     let plan = planned(arguments)?;
     let bar = progress(arguments);
-    let (mut record, link) = sample(arguments, &board, &plan, |time| {
-        bar.set_position(time as u64)
+    let say = || {
+        let at = bar.position();
+        format!("the stand is at {at} of {} s", arguments.seconds)
+    };
+    let (mut record, link) = beside_bar(arguments.quiet, say, || {
+        sample(arguments, &board, &plan, |time| {
+            bar.set_position(time as u64);
+        })
     })?;
     bar.finish_and_clear();
     outputs::mark_simulated(&mut record, "run");
@@ -319,7 +263,11 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         file: file.clone(),
         ..AnalyzeOptions::default()
     };
-    let analysis = noise::analyze(&read.record, &options).map_err(super::explain)?;
+    let say = || format!("analyzing {file}");
+    let analysis = working(arguments.quiet, say, || {
+        noise::analyze(&read.record, &options)
+    });
+    let analysis = analysis.map_err(super::explain)?;
     super::write_json(arguments.analysis.as_ref(), &analysis)?;
     let hash = super::digest(&arguments.out)?;
     let options = DiagnoseOptions {
@@ -333,12 +281,15 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
     let times = record.host_time_s.as_ref();
     let start_s = times.and_then(|times| times.first()).map_or(0.0, |t| *t);
     let hidden = planted(&plan.run, start_s);
-    let found = if felt_by_accelerometers(&hidden) {
-        let all = GYROS.into_iter().chain(ACCELEROMETERS).map(str::to_owned);
-        diagnosis::diagnose_channels(&read.record, &all.collect::<Vec<_>>(), &options)
-    } else {
-        diagnosis::diagnose(&read.record, &options)
-    };
+    let say = || format!("diagnosing {}", options.file);
+    let found = working(arguments.quiet, say, || {
+        if felt_by_accelerometers(&hidden) {
+            let all = GYROS.into_iter().chain(ACCELEROMETERS).map(str::to_owned);
+            diagnosis::diagnose_channels(&read.record, &all.collect::<Vec<_>>(), &options)
+        } else {
+            diagnosis::diagnose(&read.record, &options)
+        }
+    });
     let found = found.map_err(super::explain)?;
     let comparison = compare(&hidden, &found.diagnosis);
     let answer = Answer {

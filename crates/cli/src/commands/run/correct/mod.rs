@@ -22,6 +22,7 @@ use model::ModelFile;
 use model::record::Record;
 
 use super::super::outputs;
+use super::super::progress::beside_bar;
 use super::{Arguments, Outputs};
 use answer::{Answer, Recorded, corrected_causes};
 use stages::{BEGIN_S, Length, Planned, REST_S};
@@ -356,8 +357,11 @@ impl Loop<'_> {
                     replicates: self.arguments.replicates.count(),
                     matters: self.arguments.replicates.matters(),
                 };
-                let found =
-                    diagnosis::diagnose(&record, &options).map_err(super::super::explain)?;
+                let say = || format!("diagnosing {}", options.file);
+                let found = beside_bar(self.arguments.quiet, say, || {
+                    diagnosis::diagnose(&record, &options)
+                });
+                let found = found.map_err(super::super::explain)?;
                 Ok(Found {
                     model: found.extended_model.clone().excited_like(&record),
                     diagnosis: found.diagnosis,
