@@ -246,7 +246,7 @@ fn a_capture_in_place_of_a_model_is_told_as_such() {
     let folder = folder("model");
     for line in [
         "simulate --model run.csv --out x.csv",
-        "plan --model run.csv --want K",
+        "plan --model run.csv --separate temperature,rate_ramp",
         "run --native --model run.csv --out x.csv",
     ] {
         let output = run(&folder, line);
