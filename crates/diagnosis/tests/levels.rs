@@ -1,11 +1,14 @@
 //! Two levels, strong ones on a base at rest, a process beside a temperature, and noise that a pair of axes shares.
 
+mod draws;
+mod white;
+
 use diagnosis::DiagnoseOptions;
 use diagnosis::result::{Diagnosed, Parameter};
 use model::file::{EffectModel, ModelFile};
 use model::record::Base;
 use rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal, Uniform};
+use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 type Tested = Result<(), Box<dyn std::error::Error>>;
@@ -166,6 +169,78 @@ fn two_levels_keep_their_name_beside_a_vibration_elsewhere_that_has_none() -> Te
     }
     assert!(named >= FEWEST, "{named} of {DRAWS}");
     Ok(())
+}
+
+/// The mean over each reading, or the value at its beginning, of a level of +-1 that switches at random; stays in readings.
+fn switching(rng: &mut Xoshiro256PlusPlus, count: usize, stay: f64, averages: bool) -> Vec<f64> {
+    let mut wait = || stay * Distribution::<f64>::sample(&Exp1, rng);
+    let (mut level, mut left) = (1.0, wait());
+    let mut read = || {
+        let (begins, mut mean, mut rest) = (level, 0.0, 1.0);
+        while left < rest {
+            mean += level * left;
+            rest -= left;
+            (level, left) = (-level, wait());
+        }
+        mean += level * rest;
+        left -= rest;
+        if averages { mean } else { begins }
+    };
+    (0..count).map(|_| read()).collect()
+}
+
+/// 120 s of telegraph noise in the white noise of a sensor of any rate: named, with its half height and its dwell time within 3.3
+/// standard errors, and nothing wanders beside it.
+fn short_stays(rng: &mut Xoshiro256PlusPlus) -> Result<(), String> {
+    let ranges = [(1.8, 5.0), (1.5, 6.0), (50.0, 100.0), (0.03, 0.05)];
+    let [size, dwell, rate_hz, sigma] = ranges.map(|(low, high): (f64, f64)| {
+        let ln = Uniform::new(low.ln(), high.ln()).expect("a range");
+        ln.sample(rng).exp()
+    });
+    let averages = Uniform::new(0.0, 1.0).expect("a range").sample(rng) < 0.5;
+    let count = (120.0 * rate_hz) as usize;
+    let levels = switching(rng, count, dwell * rate_hz, averages);
+    let mut record = white::gyros(rate_hz, |_| {
+        let of = |level: &f64| -> f64 {
+            let white: f64 = StandardNormal.sample(rng);
+            size * sigma * level + sigma * white
+        };
+        levels.iter().map(of).collect()
+    });
+    record.channels.truncate(1);
+    let options = DiagnoseOptions {
+        no_evidence: true,
+        ..DiagnoseOptions::default()
+    };
+    let d = diagnosis::diagnose(&record, &options).map_err(|e| e.to_string())?;
+    let about = format!("{size:.2} sigma, {dwell:.2} s at {rate_hz:.0} Hz, averages: {averages}");
+    for (name, truth) in [("half_height", size * sigma), ("dwell_time", dwell)] {
+        let Some(p) = found(&d, "telegraph", name) else {
+            return Err(format!("{about}: not named"));
+        };
+        let off = (p.value - truth) / p.std_error.unwrap_or(0.0);
+        if off.is_nan() || off.abs() > 3.3 {
+            return Err(format!("{about}: {name} off by {off:.1} standard errors"));
+        }
+    }
+    let mut all = d.diagnosis.findings.iter();
+    match all.find(|f| ["gauss_markov", "flicker"].contains(&f.cause.as_str())) {
+        Some(f) => Err(format!("{about}: {} beside it", f.cause)),
+        None => Ok(()),
+    }
+}
+
+/// A block in which two levels switch reads neither of them, and the shorter the stays, the more blocks do: that is no third level.
+#[test]
+fn two_levels_of_short_stays_have_no_third_one_between_them() {
+    let seed = draws::seed(20_261_130);
+    let told = draws::graded(20, 17, |draw| {
+        let own = seed.wrapping_mul(1000) + draw;
+        let judged = short_stays(&mut Xoshiro256PlusPlus::seed_from_u64(own));
+        eprintln!("{judged:?}");
+        judged
+    });
+    assert!(told.is_ok(), "seed {seed}: {}", told.unwrap_err());
 }
 
 /// What departures from the dependence on a temperature may explain of a spectrum is asked of two levels as of any noise: they are no

@@ -351,13 +351,13 @@ impl<'a> Gyro<'a> {
     }
 }
 
-/// Neighbourhoods of readings in such steps, each at its level where there are two: a short stay is no reading far off, and beside a
-/// switch the neighbours tell of another level.
+/// Neighbourhoods of readings in such steps, each at its level where there are two: a short stay is no reading far off, beside a
+/// switch the neighbours tell of another level, and a reading that is a mean over both is none far off either.
 fn about_levels(y: &[f64], step: Option<f64>) -> Local {
     let Some(two) = TwoLevels::of(y, step.unwrap_or(0.0)) else {
         return Local::new(y);
     };
-    let levels = two.level(0.5 * two.distance);
+    let levels = two.level_of(y, 0.5 * two.distance);
     let at_one: Vec<f64> = y.iter().zip(&levels).map(|(y, level)| y - level).collect();
     let mut local = Local::new(&at_one);
     let each = local.level.iter_mut().zip(&levels);

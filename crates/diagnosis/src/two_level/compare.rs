@@ -20,7 +20,8 @@ use crate::fit::threshold;
 use crate::search::Search;
 use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
 pub use crate::two_level::fit::two_level;
-use crate::two_level::fit::{Coordinates, Side, Sides, again, covariance_of, fitted, many_ahead};
+use crate::two_level::fit::{Coordinates, again, coordinates, fitted, many_ahead};
+use crate::two_level::sides::{Side, Sides};
 use numerics::tails::normal_tail;
 
 /// Nats by which two levels have to be better.
@@ -41,11 +42,6 @@ const LEAST_BLOCKS: usize = 200;
 const COARSE_BLOCKS: usize = 400;
 /// Most blocks of a correlation time, where a record holds more blocks than that.
 const BLOCKS_OF_A_TIME: f64 = 10.0;
-/// Part of the half height by which one switch in every block would lower its estimate: a third by the mean square of such blocks,
-/// a half where each counts as one of the levels. Of 24 x 600 simulated blocks, half heights of 0.5 to 2 standard deviations and
-/// dwell times of 5 to 30 blocks, it was 0.20 to 0.50, 0.38 in the mean.
-const PART_OF_A_SWITCH: f64 = 0.38;
-
 /// Stationary terms with their coordinates.
 type Processes = Vec<(Arc<dyn Covariance>, Vec<f64>)>;
 
@@ -459,7 +455,7 @@ impl<'a> Field<'a> {
     /// Half height and dwell time, s, with their standard errors.
     fn stated(&self, x: &Coordinates, block_s: f64) -> Vec<(f64, f64)> {
         let m = self.blocks.len() as f64;
-        let errors = covariance_of(&self.blocks, x);
+        let (x, errors) = coordinates(&self.blocks, x, self.length == 1);
         // ln of the half height is x2 + x0 / 2.
         let least = (-2.0 * x[2]).exp() / m;
         let half_error = (errors[2][2] + errors[0][2] + 0.25 * errors[0][0])
@@ -468,9 +464,7 @@ impl<'a> Field<'a> {
         // Where the likelihood hardly bends, the switches that were seen still bound it.
         let seen = m * (-x[3]).exp();
         let dwell_error = errors[3][3].max(1.0 / seen.max(1.0)).sqrt();
-        // A block in which the level switches reads anything between the levels.
-        let mixed = (PART_OF_A_SWITCH * (-x[3]).exp()).min(0.3);
-        let half = (x[2] + 0.5 * x[0]).exp() / (1.0 - mixed);
+        let half = (x[2] + 0.5 * x[0]).exp();
         let dwell = x[3].exp() * block_s;
         vec![(half, half * half_error), (dwell, dwell * dwell_error)]
     }

@@ -10,6 +10,15 @@ use numerics::wide;
 /// ln of variance, ln of random-walk step over it, ln of half height over the white sigma, ln of dwell in blocks.
 pub(crate) type Coordinates = [f64; 4];
 
+/// Levels in half heights, and what a reading is in which they change.
+#[derive(Clone, Copy)]
+pub(crate) struct Levels<const K: usize> {
+    pub at: [f64; K],
+    /// Whether such a reading is a mean over both levels, that of a block in which they change at any time with the same chance:
+    /// then it is half way between them, give or take 1/sqrt(12) of their distance. Else it is the new level.
+    pub mixed: bool,
+}
+
 /// Likelihoods that are made side by side.
 pub(crate) const ABREAST: usize = 4;
 /// Readings whose factors are multiplied before their size is looked at: each is some 1e-4 at least, the chance of a switch.
@@ -57,24 +66,72 @@ fn below_least<const K: usize, const AT_ONCE: bool>(of: &mut [Each; K]) -> Each 
     least
 }
 
+/// Log likelihoods by [`new_level`] or [`mean_of_both`].
+pub(crate) fn filter<const K: usize>(
+    y: [&[f64]; ABREAST],
+    x: &[Coordinates; ABREAST],
+    first: &[usize; ABREAST],
+    levels: &Levels<K>,
+    seen: impl FnMut(&Each),
+) -> Each {
+    match levels.mixed {
+        true => mean_of_both(y, x, first, &levels.at, seen),
+        false => new_level(y, x, first, &levels.at, seen),
+    }
+}
+
 wide! {
-    /// Log likelihoods of readings of one length, the mean taken out, under jumps between any of `levels`, all equally
-    /// likely, the first reading on the level of the number `first`; `seen` is told the chances of the first of `levels`
-    /// after each reading. Where the first level is not known either, every level has two places where the mean may be, and
-    /// a filter that merges them by moments ends up at none of them.
-    pub(crate) fn filter[const K: usize](
+    /// Those of blocks which are mixed where the level changes.
+    fn mean_of_both[const K: usize](
         y: [&[f64]; ABREAST],
         x: &[Coordinates; ABREAST],
         first: &[usize; ABREAST],
         levels: &[f64; K],
         seen: impl FnMut(&Each),
-    ) -> Each = run::<K, true>, else run::<K, false>
+    ) -> Each = run::<K, true, true>, else run::<K, false, true>
+}
+
+wide! {
+    /// Log likelihoods of readings of one length, the mean taken out, under jumps between any of `levels`, all equally
+    /// likely, the first reading on the level of the number `first`; `seen` is told the chances of the first of `levels`
+    /// after each reading. Where the first level is not known either, every level has two places where the mean may be, and
+    /// a filter that merges them by moments ends up at none of them.
+    fn new_level[const K: usize](
+        y: [&[f64]; ABREAST],
+        x: &[Coordinates; ABREAST],
+        first: &[usize; ABREAST],
+        levels: &[f64; K],
+        seen: impl FnMut(&Each),
+    ) -> Each = run::<K, true, false>, else run::<K, false, false>
+}
+
+/// A level of a filter before a reading, and what one makes of it.
+#[derive(Clone, Copy)]
+struct Predicted {
+    /// 1 over the variance of the reading, gain, and the variance of the slow level after it.
+    inverse: Each,
+    gain: Each,
+    after: Each,
+}
+
+impl Predicted {
+    /// Of the variance `p` of the slow level and that of the reading about it.
+    #[inline(always)]
+    fn new(p: &Each, noise: &Each) -> Self {
+        let inverse = each(|l| 1.0 / (p[l] + noise[l]));
+        let gain = each(|l| p[l] * inverse[l]);
+        Self {
+            inverse,
+            gain,
+            after: each(|l| gain[l] * noise[l]),
+        }
+    }
 }
 
 /// The filter. Its inner loops are over the likelihoods alone, so that each becomes an instruction or two.
 #[inline(always)]
 #[allow(clippy::needless_range_loop)]
-fn run<const K: usize, const AT_ONCE: bool>(
+fn run<const K: usize, const AT_ONCE: bool, const MIXED: bool>(
     y: [&[f64]; ABREAST],
     x: &[Coordinates; ABREAST],
     first: &[usize; ABREAST],
@@ -106,14 +163,13 @@ fn run<const K: usize, const AT_ONCE: bool>(
     for t in 0..count {
         let v = y.map(|y| y[t]);
         // Prediction by level: weight times 1/sqrt(s), 1/s, gain, variance after the reading.
-        let [mut inverse, mut gain, mut after] = [[[0.0; ABREAST]; K]; 3];
-        for i in 0..K {
-            for l in 0..ABREAST {
-                let p = variance[i][l] + step[l];
-                inverse[i][l] = 1.0 / (p + white[l]);
-                gain[i][l] = p * inverse[i][l];
-                after[i][l] = gain[i][l] * white[l];
-                weight[i][l] *= inverse[i][l].sqrt();
+        let ahead: [Each; K] = std::array::from_fn(|i| each(|l| variance[i][l] + step[l]));
+        let stayed: [Predicted; K] = std::array::from_fn(|i| Predicted::new(&ahead[i], &white));
+        if !MIXED {
+            for i in 0..K {
+                for l in 0..ABREAST {
+                    weight[i][l] *= stayed[i].inverse[l].sqrt();
+                }
             }
         }
         step = walk;
@@ -122,11 +178,19 @@ fn run<const K: usize, const AT_ONCE: bool>(
         let [mut all, mut leasts] = [[[0.0; ABREAST]; K]; 2];
         for j in 0..K {
             let [mut parts, mut at] = [[[0.0; ABREAST]; K]; 2];
+            let mut to = stayed;
             for i in 0..K {
+                let (mut place, apart) = (levels[j], levels[j] - levels[i]);
+                if MIXED && i != j {
+                    place -= 0.5 * apart;
+                    let more = apart * apart / 12.0;
+                    let noise = each(|l| white[l] + more * half[l] * half[l]);
+                    to[i] = Predicted::new(&ahead[i], &noise);
+                }
                 for l in 0..ABREAST {
-                    let off = of(-half[l], levels[j], v[l] - before[i][l]);
-                    at[i][l] = of(gain[i][l], off, before[i][l]);
-                    parts[i][l] = 0.5 * off * off * inverse[i][l];
+                    let off = of(-half[l], place, v[l] - before[i][l]);
+                    at[i][l] = of(to[i].gain[l], off, before[i][l]);
+                    parts[i][l] = 0.5 * off * off * to[i].inverse[l];
                 }
             }
             leasts[j] = below_least::<K, AT_ONCE>(&mut parts);
@@ -134,7 +198,8 @@ fn run<const K: usize, const AT_ONCE: bool>(
             for i in 0..K {
                 let moved = if i == j { stays } else { comes };
                 for l in 0..ABREAST {
-                    parts[i][l] *= weight[i][l] * moved[l];
+                    let wide = if MIXED { to[i].inverse[l].sqrt() } else { 1.0 };
+                    parts[i][l] *= weight[i][l] * moved[l] * wide;
                     sum[l] += parts[i][l];
                     middle[l] = of(parts[i][l], at[i][l], middle[l]);
                 }
@@ -146,7 +211,7 @@ fn run<const K: usize, const AT_ONCE: bool>(
             for i in 0..K {
                 for l in 0..ABREAST {
                     let away = at[i][l] - middle[l];
-                    spread[l] = of(parts[i][l], of(away, away, after[i][l]), spread[l]);
+                    spread[l] = of(parts[i][l], of(away, away, to[i].after[l]), spread[l]);
                 }
             }
             (all[j], mean[j]) = (sum, middle);
@@ -204,17 +269,22 @@ mod tests {
             std::array::from_fn(|l| [0.1 * l as f64, -9.0, -0.5 + 0.3 * l as f64, 4.0]);
         let first = [0, 1, 1, 0];
         let (two, many) = ([1.0, -1.0], [-1.5, -0.7, 0.0, 0.7, 1.5]);
+        let y = [&y[..]; ABREAST];
         let here = [
-            filter([&y; ABREAST], &x, &first, &two, |_| {}),
-            filter([&y; ABREAST], &x, &first, &many, |_| {}),
+            new_level(y, &x, &first, &two, |_| {}),
+            new_level(y, &x, &first, &many, |_| {}),
+            mean_of_both(y, &x, &first, &two, |_| {}),
+            mean_of_both(y, &x, &first, &many, |_| {}),
         ];
         let plain = [
-            run::<2, false>([&y; ABREAST], &x, &first, &two, |_| {}),
-            run::<5, false>([&y; ABREAST], &x, &first, &many, |_| {}),
+            run::<2, false, false>(y, &x, &first, &two, |_| {}),
+            run::<5, false, false>(y, &x, &first, &many, |_| {}),
+            run::<2, false, true>(y, &x, &first, &two, |_| {}),
+            run::<5, false, true>(y, &x, &first, &many, |_| {}),
         ];
         for (a, b) in here.iter().flatten().zip(plain.iter().flatten()) {
             assert!((a / b - 1.0).abs() < 1e-10, "{a} {b}");
         }
-        assert!(here[0][0] != here[0][1]);
+        assert!(here[0][0] != here[0][1] && here[0][0] != here[2][0]);
     }
 }

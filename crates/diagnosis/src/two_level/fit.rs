@@ -1,19 +1,24 @@
-//! Block means that lie about two levels: white noise, a random walk of the level, switches at random ([`crate::two_level::filter_bank`]); and
-//! how the answer is held against replicates of either side.
+//! Block means that lie about two levels: white noise, a random walk of the level, switches at random ([`crate::two_level::filter_bank`]).
 
-use rand_core::SeedableRng;
 use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::fit::likelihood::{Bins, Dct, Noise};
 pub(crate) use crate::two_level::filter_bank::Coordinates;
-use crate::two_level::filter_bank::{ABREAST, filter};
+use crate::two_level::filter_bank::{ABREAST, Levels, filter};
 use numerics::minimise::side_by_side;
 
-/// Levels of the two-level process, in half heights.
-const TWO: [f64; 2] = [1.0, -1.0];
+/// Levels of the two-level process.
+const TWO: Levels<2> = Levels {
+    at: [1.0, -1.0],
+    mixed: false,
+};
+/// The same where a block in which they switch is known to be mixed: it lies at neither.
+const TWO_OF_BLOCKS: Levels<2> = Levels { mixed: true, ..TWO };
 /// Levels that stand for any: five of a normal distribution.
-const MANY: [f64; 5] = [-1.5, -0.7, 0.0, 0.7, 1.5];
+const MANY_OF_BLOCKS: Levels<5> = Levels {
+    at: [-1.5, -0.7, 0.0, 0.7, 1.5],
+    mixed: true,
+};
 
 /// Block means, coordinates and the number of the level of the first mean.
 type From<'a> = (&'a [f64], Coordinates, usize);
@@ -24,8 +29,13 @@ pub fn two_level(y: &[f64], x: &Coordinates) -> f64 {
     from_any(&[(y, *x)], &TWO)[0]
 }
 
+/// The same of several, all of one length.
+pub(crate) fn two_levels(of: &[(&[f64], Coordinates)]) -> Vec<f64> {
+    from_any(of, &TWO)
+}
+
 /// The same of several, all of one length, for jumps between any of `levels`, all equally likely, from a given one.
-fn likelihoods<const K: usize>(of: &[From<'_>], levels: &[f64; K]) -> Vec<f64> {
+fn likelihoods<const K: usize>(of: &[From<'_>], levels: &Levels<K>) -> Vec<f64> {
     of.chunks(ABREAST)
         .flat_map(|few| {
             // Places that are left hold the last one again.
@@ -44,7 +54,7 @@ fn likelihoods<const K: usize>(of: &[From<'_>], levels: &[f64; K]) -> Vec<f64> {
 }
 
 /// The same from every level.
-fn from_each<const K: usize>(of: &[(&[f64], Coordinates)], levels: &[f64; K]) -> Vec<[f64; K]> {
+fn from_each<const K: usize>(of: &[(&[f64], Coordinates)], levels: &Levels<K>) -> Vec<[f64; K]> {
     let all: Vec<From<'_>> = of
         .iter()
         .flat_map(|(y, x)| (0..K).map(|first| (*y, *x, first)))
@@ -55,7 +65,7 @@ fn from_each<const K: usize>(of: &[(&[f64], Coordinates)], levels: &[f64; K]) ->
 }
 
 /// The same from any level, all equally likely.
-fn from_any<const K: usize>(of: &[(&[f64], Coordinates)], levels: &[f64; K]) -> Vec<f64> {
+fn from_any<const K: usize>(of: &[(&[f64], Coordinates)], levels: &Levels<K>) -> Vec<f64> {
     let sum = |logs: [f64; K]| {
         let top = logs.into_iter().fold(f64::NEG_INFINITY, f64::max);
         top + logs.map(|l| (l - top).exp()).iter().sum::<f64>().ln()
@@ -64,7 +74,7 @@ fn from_any<const K: usize>(of: &[(&[f64], Coordinates)], levels: &[f64; K]) -> 
 }
 
 /// The level that block means most probably begin on.
-fn first_level<const K: usize>(y: &[f64], x: &Coordinates, levels: &[f64; K]) -> usize {
+fn first_level<const K: usize>(y: &[f64], x: &Coordinates, levels: &Levels<K>) -> usize {
     let logs = from_each(&[(y, *x)], levels)[0];
     let best = (0..K).max_by(|a, b| logs[*a].total_cmp(&logs[*b]));
     best.unwrap_or(0)
@@ -198,7 +208,7 @@ fn clamped(x: &[f64], m: usize) -> (Coordinates, f64) {
 fn highest<const K: usize>(
     y: &[f64],
     starts: &[Coordinates],
-    (first, levels): (usize, &[f64; K]),
+    (first, levels): (usize, &Levels<K>),
     steps: usize,
 ) -> Vec<(f64, Coordinates)> {
     let objective = |all: &[Vec<f64>]| {
@@ -218,7 +228,7 @@ fn highest<const K: usize>(
 fn highest_from<const K: usize>(
     y: &[f64],
     start: &Coordinates,
-    levels: &[f64; K],
+    levels: &Levels<K>,
     steps: usize,
 ) -> (f64, Coordinates) {
     let first = first_level(y, start, levels);
@@ -280,14 +290,32 @@ pub(crate) fn with_column(y: &[f64], x: &Coordinates, column: &[f64]) -> (f64, f
     (best.0, best.1 - without.0)
 }
 
-/// Nats that many levels are ahead of two, from where the two are at their best.
+/// Nats that many levels are ahead of two on means of blocks, from where the two are at their best. Either side knows what it
+/// makes of a block in which a level changes: to two levels that did not, it would be a level of its own.
 pub(crate) fn many_ahead(y: &[f64], two: &Coordinates) -> f64 {
-    highest_from(y, two, &MANY, 60).0 - two_level(y, two)
+    highest_from(y, two, &MANY_OF_BLOCKS, 60).0 - highest_from(y, two, &TWO_OF_BLOCKS, 60).0
+}
+
+/// Coordinates of two levels on means of blocks, with their covariance. A block of a `single` reading may have been read at one
+/// time or over its whole length, whichever it shows.
+pub(crate) fn coordinates(
+    y: &[f64],
+    x: &Coordinates,
+    single: bool,
+) -> (Coordinates, Vec<Vec<f64>>) {
+    let mixed = highest_from(y, x, &TWO_OF_BLOCKS, 160);
+    if single {
+        let at_once = highest_from(y, x, &TWO, 160);
+        if at_once.0 > mixed.0 {
+            return (at_once.1, covariance_of(y, &at_once.1, &TWO));
+        }
+    }
+    (mixed.1, covariance_of(y, &mixed.1, &TWO_OF_BLOCKS))
 }
 
 /// Covariance of the coordinates at a highest point of the two levels' likelihood: the inverse of its curvature, all
 /// coordinates free. One that the data do not bend, such as a random walk of nearly nothing, is held.
-pub(crate) fn covariance_of(y: &[f64], x: &Coordinates) -> Vec<Vec<f64>> {
+fn covariance_of(y: &[f64], x: &Coordinates, levels: &Levels<2>) -> Vec<Vec<f64>> {
     const H: f64 = 0.06;
     let at = |moves: &[&[(usize, f64)]]| {
         let moved = moves.iter().map(|moves| {
@@ -297,7 +325,7 @@ pub(crate) fn covariance_of(y: &[f64], x: &Coordinates) -> Vec<Vec<f64>> {
             }
             (y, at)
         });
-        from_any(&moved.collect::<Vec<_>>(), &TWO)
+        from_any(&moved.collect::<Vec<_>>(), levels)
     };
     let second = |i: usize, j: usize| {
         if i == j {
@@ -328,146 +356,9 @@ pub(crate) fn covariance_of(y: &[f64], x: &Coordinates) -> Vec<Vec<f64>> {
     crate::fit::likelihood::invert(&information).0
 }
 
-/// Replicates of one side of a contest.
-const REPLICATES: usize = 40;
-/// Coordinates that both sides have: white noise, random walk, size and time of the one, and of the other.
-const FITTED: f64 = 8.0;
-
-/// One side of a contest.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Side {
-    Gaussian,
-    TwoLevels,
-}
-
-/// Both sides of a contest, fitted to the same block means.
-pub(crate) struct Sides<'a> {
-    pub dct: &'a Dct,
-    pub bins: &'a Bins,
-    /// The Gaussian one: noise and its white variance.
-    pub noise: Noise,
-    pub white: f64,
-    pub two: Coordinates,
-}
-
-impl Sides<'_> {
-    /// Nats that the two levels are ahead on block means, both as they were fitted.
-    fn ahead(&self, all: &[Vec<f64>], g: &[f64]) -> Vec<f64> {
-        let variances: Vec<f64> = g[1..].iter().map(|g| self.white * g).collect();
-        let logs = (variances.iter()).map(|v| (std::f64::consts::TAU * v).ln());
-        let logs: f64 = logs.sum();
-        let gaussian = self.dct.forward_all(all).map(|c| {
-            let squares = c[1..].iter().zip(&variances).map(|(c, v)| c * c / v);
-            -0.5 * (squares.sum::<f64>() + logs)
-        });
-        let at: Vec<_> = all.iter().map(|y| (&y[..], self.two)).collect();
-        let two = from_any(&at, &TWO);
-        two.into_iter().zip(gaussian).map(|(l, g)| l - g).collect()
-    }
-
-    /// Coefficients of block means of the Gaussian side.
-    fn gaussian(&self, g: &[f64], rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-        let mut c: Vec<f64> = g
-            .iter()
-            .map(|g| {
-                let e: f64 = StandardNormal.sample(rng);
-                e * (self.white * g).sqrt()
-            })
-            .collect();
-        c[0] = 0.0;
-        c
-    }
-
-    /// Cox's test of separate families: standard errors between `ahead`, the nats by which two levels are better, and
-    /// what it is where `truth` holds. Replicates are weighed with both sides as they were fitted; what the fits add is
-    /// half a chi-square of the fitted coordinates.
-    pub fn cox(&self, ahead: f64, truth: Side) -> f64 {
-        let g = self.noise.everywhere(self.bins);
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x7477_6f20_7369_6465);
-        let mut drawn = |draw: &mut dyn FnMut(&mut _) -> Vec<f64>| -> Vec<Vec<f64>> {
-            (0..REPLICATES).map(|_| draw(&mut rng)).collect()
-        };
-        let all = match truth {
-            Side::Gaussian => {
-                let c = drawn(&mut |rng| self.gaussian(&g, rng));
-                self.dct.inverse_all(&c).collect()
-            }
-            Side::TwoLevels => drawn(&mut |rng| replicate(g.len(), &self.two, rng)),
-        };
-        let all = self.ahead(&all, &g);
-        let n = all.len() as f64;
-        let mean = all.iter().sum::<f64>() / n;
-        let variance = all.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (ahead - mean) / (variance + 0.5 * FITTED).sqrt()
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use model::effect::{Covariance, Frequencies};
-
     use super::*;
-
-    /// A process of variance exp(theta0) and correlation of exp(theta1) blocks.
-    struct OnePole;
-
-    impl Covariance for OnePole {
-        fn dimensions(&self) -> usize {
-            2
-        }
-
-        fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
-            at.one_pole(theta[0].exp(), (-(-theta[1]).exp()).exp())
-        }
-
-        fn bounds(&self, _: usize) -> Vec<(f64, f64)> {
-            vec![(-16.0, 6.0), (0.0, 8.0)]
-        }
-
-        fn starts(&self, _: usize) -> Vec<Vec<f64>> {
-            vec![vec![0.0, 3.0]]
-        }
-    }
-
-    #[test]
-    fn replicates_tell_two_levels_from_a_gaussian_process_of_their_spectrum() {
-        let m = 2000;
-        let (dct, bins) = (Dct::new(m), Bins::new(m));
-        // Two levels of 1 sigma that stay 40 blocks have this spectrum.
-        let sides = Sides {
-            dct: &dct,
-            bins: &bins,
-            noise: Noise {
-                log_walk: f64::NEG_INFINITY,
-                terms: vec![(Arc::new(OnePole), vec![0.0, 20f64.ln()])],
-            },
-            white: 1.0,
-            two: [0.0, -25.0, 0.0, 40f64.ln()],
-        };
-        let g = sides.noise.everywhere(&bins);
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
-        let scores = |y: Vec<f64>| {
-            let ahead = sides.ahead(&[y], &g)[0];
-            [Side::Gaussian, Side::TwoLevels].map(|s| sides.cox(ahead, s))
-        };
-        // What holds stays within a few errors; what does not lies, on average, where its claim fails.
-        let (runs, fails) = (5, 3.3);
-        let (mut as_two, mut as_gaussian) = (0.0, 0.0);
-        for _ in 0..runs {
-            let [gaussian, two] = scores(dct.inverse(&sides.gaussian(&g, &mut rng)));
-            assert!(gaussian.abs() < 3.5, "{gaussian}");
-            as_two += two / f64::from(runs);
-            let [gaussian, two] = scores(replicate(m, &sides.two, &mut rng));
-            assert!(two.abs() < 3.5, "{two}");
-            as_gaussian += gaussian / f64::from(runs);
-        }
-        assert!(
-            as_two < -fails && as_gaussian > fails,
-            "{as_two} {as_gaussian}"
-        );
-    }
 
     #[test]
     fn dwell_times_of_levels_that_are_plain_to_see_are_found() {

@@ -3,3 +3,4 @@
 pub mod compare;
 pub mod filter_bank;
 pub mod fit;
+mod sides;

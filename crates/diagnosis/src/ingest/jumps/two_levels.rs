@@ -88,6 +88,29 @@ impl TwoLevels {
         self.upper.iter().map(of).collect()
     }
 
+    /// The places before and after each switch, some of them twice.
+    pub(crate) fn beside_switches(&self) -> impl Iterator<Item = usize> {
+        let both = |at: &usize| [at.saturating_sub(1), *at];
+        self.switches.iter().flat_map(both)
+    }
+
+    /// The same about the course of `y`, in which a reading beside a switch may be a mean over both levels.
+    pub(crate) fn level_of(&self, y: &[f64], half: f64) -> Vec<f64> {
+        let mut level = self.level(half);
+        let at_one: Vec<f64> = y.iter().zip(&level).map(|(y, level)| y - level).collect();
+        for k in self.beside_switches() {
+            // One of the two readings is on its level.
+            let near = [k.wrapping_sub(2), k + 2].map(|i| at_one.get(i).copied());
+            let near = near.into_iter().flatten().filter(|v| v.is_finite());
+            let (sum, count) = near.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+            let read = y[k] - sum / count;
+            if read.abs() < half {
+                level[k] = read;
+            }
+        }
+        level
+    }
+
     pub(super) fn jumps(&self) -> Vec<Jump> {
         let jump = |at: &usize| Jump {
             at: *at,
@@ -273,6 +296,17 @@ mod tests {
         y[999] = 30.0;
         let two = TwoLevels::of(&y, 0.0).expect("two levels");
         assert_eq!(two.on_the_way, [499, 999]);
+    }
+
+    #[test]
+    fn a_reading_in_which_they_switch_is_at_what_it_reads_between_them() {
+        let mut y = readings(14.0, &[500, 500, 500, 500, 500], 9);
+        // Half way, and the last one of its stay; beyond its level.
+        (y[499], y[1000]) = (7.0, -9.0);
+        let two = TwoLevels::of(&y, 0.0).expect("two levels");
+        let level = two.level_of(&y, 7.0);
+        assert!(level[499].abs() < 2.5, "{}", level[499]);
+        assert_eq!((level[1000], level[700], level[250]), (-7.0, 7.0, -7.0));
     }
 
     #[test]

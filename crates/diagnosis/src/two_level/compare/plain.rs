@@ -70,15 +70,21 @@ pub(super) fn hold(
     Some(with_levels(search, found, own, level))
 }
 
-/// Half the distance of two levels beside white noise and a random walk, with its standard error.
+/// Half the distance of two levels beside white noise and a random walk, with its standard error. One of the readings on either
+/// side of a switch may be a mean over both levels: they tell of the levels by a column of their own.
 fn half_height(search: &Search<'_>, kept: &State, two: &TwoLevels) -> (f64, f64) {
     let panel = &search.panel;
+    let mut inside = two.level(1.0);
+    let mut beside = vec![0.0; inside.len()];
+    for k in two.beside_switches() {
+        (beside[k], inside[k]) = (beside[k] + inside[k], 0.0);
+    }
     let mut columns = kept.columns();
-    columns.push(panel.add(&two.level(1.0)));
+    let own = columns.len();
+    columns.extend([panel.add(&inside), panel.add(&beside)]);
     let (_, solution) = panel.fit(&Noise::new(kept.noise.log_walk.min(-12.0)), &columns);
-    let last = columns.len() - 1;
-    let variance = solution.white * solution.inverse[last][last];
-    (solution.beta[last], variance.sqrt())
+    let variance = solution.white * solution.inverse[own][own];
+    (solution.beta[own], variance.sqrt())
 }
 
 /// The state of the data without their levels, and the term that stands for these.
