@@ -189,8 +189,8 @@ fn switching(rng: &mut Xoshiro256PlusPlus, count: usize, stay: f64, averages: bo
     (0..count).map(|_| read()).collect()
 }
 
-/// 120 s of telegraph noise in the white noise of a sensor of any rate: named, with its half height and its dwell time within 3.3
-/// standard errors, and nothing wanders beside it.
+/// 120 s of telegraph noise in the white noise of a sensor of any rate, its stays no shorter than 1.5 s, below which the name is still
+/// often lost: named, with its half height and its dwell time within 3.3 standard errors, and nothing wanders beside it.
 fn short_stays(rng: &mut Xoshiro256PlusPlus) -> Result<(), String> {
     let ranges = [(1.8, 5.0), (1.5, 6.0), (50.0, 100.0), (0.03, 0.05)];
     let [size, dwell, rate_hz, sigma] = ranges.map(|(low, high): (f64, f64)| {

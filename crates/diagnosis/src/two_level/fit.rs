@@ -358,6 +358,8 @@ fn covariance_of(y: &[f64], x: &Coordinates, levels: &Levels<2>) -> Vec<Vec<f64>
 
 #[cfg(test)]
 mod tests {
+    use rand_core::SeedableRng;
+
     use super::*;
 
     #[test]

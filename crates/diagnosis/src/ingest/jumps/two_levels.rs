@@ -302,7 +302,7 @@ mod tests {
     fn a_reading_in_which_they_switch_is_at_what_it_reads_between_them() {
         let mut y = readings(14.0, &[500, 500, 500, 500, 500], 9);
         // Half way, and the last one of its stay; beyond its level.
-        (y[499], y[1000]) = (7.0, -9.0);
+        (y[499], y[1000]) = (7.0, -3.0);
         let two = TwoLevels::of(&y, 0.0).expect("two levels");
         let level = two.level_of(&y, 7.0);
         assert!(level[499].abs() < 2.5, "{}", level[499]);
