@@ -111,7 +111,7 @@ pub fn diagnose_owned(
 
 fn diagnosed(mut of: Prepared, options: &DiagnoseOptions) -> Diagnosed {
     let at_rest = at_rest::believed(&mut of.grid);
-    far_readings::settle(&mut of.grid, &of.audited, &of.singles);
+    far_readings::settle(&mut of.grid, &of.audited, &of.singles, &of.blows);
     let between = std::mem::take(&mut of.audited.between);
     let mut searched = channel::all_searched(&of.grid, !between.is_empty());
     of.grid.dct.forget();

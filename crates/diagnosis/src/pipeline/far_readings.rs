@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 use super::channel;
 use crate::audit::Audit;
+use crate::ingest::blows::Blow;
 use crate::ingest::spikes::spike_limit;
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::wild;
@@ -18,21 +19,27 @@ use crate::search::searched::Searched;
 /// Searches of a channel for readings that come back: each of them may bear out more.
 const ROUNDS: usize = 3;
 
-/// Judges the far readings of each channel at rest; `singles` are the places of those that the audit of counts set aside.
-pub(super) fn settle(grid: &mut Grid, audited: &Audit, singles: &BTreeMap<String, Vec<usize>>) {
+/// Judges the far readings of each channel at rest; `singles` are the places of those that the audit of counts set aside. Those of
+/// `blows` are neither single ones nor the tails of a noise.
+pub(super) fn settle(
+    grid: &mut Grid,
+    audited: &Audit,
+    singles: &BTreeMap<String, Vec<usize>>,
+    blows: &[Blow],
+) {
     let single = spike_limit(grid.n);
     for i in 0..grid.targets.len() {
         if grid.targets[i].moving {
             continue;
         }
         for _ in 0..ROUNDS {
-            let back = explained(grid, i, singles, single);
+            let back = explained(grid, i, singles, (blows, single));
             if back.is_empty() {
                 break;
             }
             wild::give_back(grid, i, &back);
         }
-        set_aside_wild(grid, i, audited, single);
+        set_aside_wild(grid, i, audited, (blows, single));
     }
 }
 
@@ -41,7 +48,7 @@ fn explained(
     grid: &Grid,
     channel: usize,
     singles: &BTreeMap<String, Vec<usize>>,
-    single: f64,
+    (blows, single): (&[Blow], f64),
 ) -> Vec<usize> {
     let target = &grid.targets[channel];
     let of_counts = singles.get(&target.name);
@@ -50,31 +57,41 @@ fn explained(
         return vec![];
     }
     let s = channel::searched(grid, target);
-    let sizes = sizes_aside(&s, target);
+    let aside = aside(&s, target, blows);
     let mut read = vec![true; s.e.len()];
     target.lost.iter().for_each(|i| read[*i] = false);
     let own = s.e.iter().zip(read).filter(|(_, read)| *read);
-    let all = own.map(|(e, _)| *e).chain(sizes.iter().copied());
+    let all = own
+        .map(|(e, _)| *e)
+        .chain(aside.iter().map(|(_, size)| *size));
     let tails = wild::are_tails(all, single);
     let found = !s.state.terms.is_empty();
-    let each = target.aside.iter().zip(sizes);
-    each.filter(|((at, _), size)| far(at) && (tails || found && size.abs() < single))
-        .map(|((at, _), _)| *at)
+    let each = aside.into_iter();
+    each.filter(|(at, size)| far(at) && (tails || found && size.abs() < single))
+        .map(|(at, _)| at)
         .collect()
 }
 
-/// How far the readings that are set aside lie from what a search found, in standard deviations of the noise there.
-fn sizes_aside(s: &Searched<'_>, target: &Target) -> Vec<f64> {
+/// The places of the readings that are set aside, but for those of blows, and how far they lie from what a search found, in standard
+/// deviations of the noise there.
+fn aside(s: &Searched<'_>, target: &Target, blows: &[Blow]) -> Vec<(usize, f64)> {
     let white = s.state.solution.white.sqrt();
     let data = s.search.panel.dct.inverse(&s.search.panel.column(0));
     let law = |i: usize| s.variance.product().map_or(1.0, |v| v[i].sqrt());
-    (target.aside.iter())
-        .map(|(at, given)| s.e[*at] + (given - data[*at]) / (white * law(*at)))
+    let of_blow = |at: &usize| blows.iter().any(|b| b.readings.contains(at));
+    let single = target.aside.iter().filter(|(at, _)| !of_blow(at));
+    single
+        .map(|(at, given)| (*at, s.e[*at] + (given - data[*at]) / (white * law(*at))))
         .collect()
 }
 
 /// Sets aside wild readings that are too many rather than too far off, where a first search shows that nothing else makes them.
-fn set_aside_wild(grid: &mut Grid, channel: usize, audited: &Audit, single: f64) {
+fn set_aside_wild(
+    grid: &mut Grid,
+    channel: usize,
+    audited: &Audit,
+    (blows, single): (&[Blow], f64),
+) {
     let target = &grid.targets[channel];
     let by_counts = ["outliers", "spikes"];
     let told = by_counts
@@ -84,7 +101,8 @@ fn set_aside_wild(grid: &mut Grid, channel: usize, audited: &Audit, single: f64)
         return;
     }
     let s = channel::searched(grid, target);
-    let known = sizes_aside(&s, target);
+    let known = aside(&s, target, blows).into_iter().map(|(_, size)| size);
+    let known: Vec<f64> = known.collect();
     let mut e = s.e.clone();
     target.lost.iter().for_each(|at| e[*at] = 0.0);
     let Some(limit) = wild::found(&e, &known, single) else {
