@@ -12,17 +12,20 @@ use crate::ingest::blows::{Blow, Shape};
 const LONGER: f64 = 2.0;
 /// Standard deviations of what is left that a grid reaches to, either way.
 const REACH: f64 = 4.0;
-/// Grids, each of which is laid about what the one before has left.
+/// Grids, each of which is laid about what the one before has left: at least so many, and more until what is left is no less than a
+/// step of the grid. Each is four times as fine as the one before: the last one tells of a blow of 10^4 standard deviations.
 const GRIDS: usize = 3;
+const MOST_GRIDS: usize = 9;
 /// Points of a grid from one value to another.
 fn points(from: f64, to: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let step = (to - from) / (count - 1).max(1) as f64;
     (0..count).map(move |i| from + step * i as f64)
 }
 
-/// A grid of half sines: begins, and logarithms of their lengths.
+/// A grid of half sines: begins or, of which less is left open beside the length, middles, and logarithms of their lengths.
 struct HalfSines {
-    start: [f64; 3],
+    at: [f64; 3],
+    of_middle: bool,
     log_width: [f64; 3],
 }
 
@@ -46,12 +49,12 @@ fn grid([from, to, count]: [f64; 3]) -> impl Iterator<Item = f64> + Clone {
 impl HalfSines {
     fn places(&self) -> Vec<Place> {
         let widths = grid(self.log_width);
-        let of = |start: f64| {
-            widths
-                .clone()
-                .map(move |w| (start, Shape::HalfSine(w.exp())))
+        let before = if self.of_middle { 0.5 } else { 0.0 };
+        let of = |at: f64| {
+            let widths = widths.clone().map(f64::exp);
+            widths.map(move |w| (at - before * w, Shape::HalfSine(w)))
         };
-        grid(self.start).flat_map(of).collect()
+        grid(self.at).flat_map(of).collect()
     }
 }
 
@@ -128,25 +131,45 @@ pub(super) fn half_sines(piece: &Piece, blow: &Blow, rate_hz: f64) -> Known {
     let from = (blow.readings.start - piece.all.start) as f64;
     let reach = blow.readings.len() as f64;
     let mut wanted = HalfSines {
-        start: [from - 1.0, from + reach, (2.0 * reach).clamp(24.0, 80.0)],
+        at: [from - 1.0, from + reach, (2.0 * reach).clamp(24.0, 80.0)],
+        of_middle: false,
         log_width: [0.0, longest.min((1.5 * reach).ln()), 20.0],
     };
     let mut known = Known::of(piece, wanted.places(), &blow.felt);
-    for _ in 1..GRIDS {
+    for grids in 1..MOST_GRIDS {
         let Some((best, _)) = known.best() else { break };
-        let step = |g: [f64; 3]| 0.5 * (g[1] - g[0]) / (g[2] - 1.0).max(1.0);
         let log_width = |p: &Place| coordinates(p).0.ln();
-        let spreads = [
-            known.spread(&|p| p.0).max(step(wanted.start)),
-            known.spread(&log_width).max(step(wanted.log_width)),
-        ];
+        let middle = |p: &Place| p.0 + 0.5 * coordinates(p).0;
+        let left = [known.spread(&middle), known.spread(&log_width)];
+        let steps = [wanted.at, wanted.log_width].map(step);
+        if grids >= GRIDS && resolved(&left, &steps) {
+            break;
+        }
+        let width = coordinates(&best).0;
+        let starts = [from - 2.0, from + reach].map(|start| start + 0.5 * width);
         wanted = HalfSines {
-            start: about(best.0, spreads[0], 25, [from - 2.0, from + reach]),
-            log_width: about(log_width(&best), spreads[1], 17, [0.0, longest]),
+            at: about(middle(&best), left[0].max(0.5 * steps[0]), 25, starts),
+            of_middle: true,
+            log_width: about(
+                log_width(&best),
+                left[1].max(0.5 * steps[1]),
+                17,
+                [0.0, longest],
+            ),
         };
         known = Known::of(piece, wanted.places(), &blow.felt);
     }
     known
+}
+
+/// From one value of a grid to the next.
+fn step([from, to, count]: [f64; 3]) -> f64 {
+    (to - from) / (count - 1.0).max(1.0)
+}
+
+/// Whether what is left of each coordinate is no less than a step of its grid.
+fn resolved(left: &[f64], steps: &[f64]) -> bool {
+    left.iter().zip(steps).all(|(left, step)| left >= step)
 }
 
 /// The rings that a blow may be; none where a second has too few readings of one.
@@ -185,15 +208,16 @@ pub(super) fn rings(piece: &Piece, blow: &Blow, rate_hz: f64) -> Known {
     wanted.log_fades = within(wanted.log_fades, bounds);
     wanted.pitch = within(wanted.pitch, PITCHES);
     let mut known = Known::of(piece, wanted.places(), &blow.felt);
-    for _ in 1..GRIDS {
+    for grids in 1..MOST_GRIDS {
         let Some((best, _)) = known.best() else { break };
-        let step = |g: [f64; 3]| 0.5 * (g[1] - g[0]) / (g[2] - 1.0).max(1.0);
         let log_fades = |p: &Place| coordinates(p).0.ln();
         let pitch = |p: &Place| coordinates(p).1;
-        let spreads = [
-            known.spread(&log_fades).max(step(wanted.log_fades)),
-            known.spread(&pitch).max(step(wanted.pitch)),
-        ];
+        let left = [known.spread(&log_fades), known.spread(&pitch)];
+        let steps = [wanted.log_fades, wanted.pitch].map(step);
+        if grids >= GRIDS && resolved(&left, &steps) {
+            break;
+        }
+        let spreads = [0, 1].map(|k| left[k].max(0.5 * steps[k]));
         wanted = Rings {
             first: [best.0 - 2.0, best.0 + 2.0, 5.0],
             log_fades: about(log_fades(&best), spreads[0], 11, bounds),
