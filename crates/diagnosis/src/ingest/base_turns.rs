@@ -19,10 +19,10 @@ use numerics::wide;
 
 /// Shortest and longest turn, s: a blow rings for less; what takes longer is drift to a gyro that warms up.
 const SHORTEST_S: f64 = 0.8;
-const LONGEST_S: f64 = 30.0;
+pub(super) const LONGEST_S: f64 = 30.0;
 /// Least peak, deg/s, of what no bias of this class of part does: four times the rms that one may wander by. Its sensitivity
 /// to acceleration, 0.2 deg/s/g, would need six g.
-const LEAST_PEAK: f64 = 4.0 * MOTION_RMS;
+pub(super) const LEAST_PEAK: f64 = 4.0 * MOTION_RMS;
 /// Terms of the series, and the median of chi-square of as many degrees.
 const SHAPES: usize = 3;
 const MEDIAN: f64 = 2.366;
@@ -38,7 +38,7 @@ const SHARE: f64 = 0.75;
 /// Part of its peak by which the level after it may differ from that before.
 const RETURNS: f64 = 0.25;
 /// Part of the record up to which a base is turned now and then; beyond it moves.
-const SELDOM: f64 = 0.1;
+pub(super) const SELDOM: f64 = 0.1;
 /// Stretches that stand out for other reasons beside a turn, at most: a step or a hole, not one of many.
 const BESIDE: usize = 3;
 /// Blocks of a turn, and of the rest on either side of it, when it is looked for.
@@ -147,7 +147,7 @@ pub fn largest_rate(y: &[f64], samples: &Range<usize>) -> f64 {
 }
 
 /// Whether two stretches have a sample in common.
-fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+pub(crate) fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
     a.start < b.end && b.start < a.end
 }
 

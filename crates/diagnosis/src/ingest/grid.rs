@@ -1,6 +1,8 @@
 //! From a record to an even grid: gaps found by the sequence numbers, lost samples filled so that the likelihood cannot
 //! tell, slow channels smoothed, motion of the base noticed.
 
+mod levelled;
+mod readings;
 mod signals;
 #[cfg(test)]
 mod tests;
@@ -21,10 +23,12 @@ use crate::ingest::spikes::spikes;
 use crate::ingest::types::{Grid, Target};
 use crate::ingest::{dequantise, fill, kalman};
 use crate::test_level::on_two_threads;
+use levelled::Still;
 use model::record::AnalysisError;
 use numerics::column::LONG;
 use numerics::series::{smallest_step, white_by_differences};
 use numerics::transform::quick_length;
+use readings::{is_constant, unit_of, white_of};
 use signals::{of_gyro, other};
 
 /// Least number of samples of a gyro.
@@ -123,7 +127,24 @@ pub fn lay_out(
     masked: &dyn Fn(&str) -> Vec<usize>,
     seed: u64,
 ) -> Result<Grid, AnalysisError> {
-    let layout = Layout::new(record, masked)?;
+    on_grid(Layout::new(record, masked)?, record, seed)
+}
+
+/// The same, brief events beyond the noise left where they are: part of a motion, of jumps, or of nothing.
+///
+/// # Errors
+/// As [`crate::diagnose`].
+pub(crate) fn with_knocks(
+    record: &Record,
+    masked: &dyn Fn(&str) -> Vec<usize>,
+    seed: u64,
+) -> Result<Grid, AnalysisError> {
+    let mut layout = Layout::new(record, masked)?;
+    layout.asks_for_knocks = false;
+    on_grid(layout, record, seed)
+}
+
+fn on_grid(layout: Layout<'_>, record: &Record, seed: u64) -> Result<Grid, AnalysisError> {
     let gyros = || record.all(Quantity::Gyro);
     let targets = |felt: &[Vec<Excursion>]| -> Result<Vec<Target>, _> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x6d69_7373_696e_6721);
@@ -161,21 +182,12 @@ pub fn lay_out(
     })
 }
 
-/// The readings of a gyro whose levels are made one.
-struct Still {
-    given: Vec<f64>,
-    lost: Vec<usize>,
-    /// The lost ones filled, their coefficients, and white noise and a random walk fitted to them.
-    y: Vec<f64>,
-    c: Arc<Vec<f64>>,
-    fit: (Noise, f64),
-    motion_rms: f64,
-}
-
 /// The grid while channels are put on it.
 struct Layout<'a> {
     masked: &'a dyn Fn(&str) -> Vec<usize>,
     base: Option<Base>,
+    /// Whether brief events are left out where they would pass for a motion or for jumps.
+    asks_for_knocks: bool,
     rate_hz: f64,
     /// Places, those up to the last reading, and that of every row.
     n: usize,
@@ -221,6 +233,7 @@ impl<'a> Layout<'a> {
         Ok(Self {
             masked,
             base: record.header.base,
+            asks_for_knocks: true,
             rate_hz,
             n,
             end,
@@ -347,32 +360,6 @@ impl<'a> Layout<'a> {
             .collect()
     }
 
-    /// White noise, a random walk and the motion in the readings `given` of a gyro, once their levels are made one.
-    fn still(
-        &self,
-        (given, lost): (&[f64], &[usize]),
-        jumps: &Jumps,
-        is_rate: bool,
-        (guess, rng): (f64, &mut Xoshiro256PlusPlus),
-    ) -> Still {
-        let lost = [lost, &jumps.on_the_way].concat();
-        let given = jumps.levelled(given);
-        let (y, c, fit) = self.filled(&given, guess, rng);
-        let motion_rms = if is_rate {
-            self.motion(&y, &c, &lost, &fit)
-        } else {
-            0.0
-        };
-        Still {
-            given,
-            lost,
-            y,
-            c,
-            fit,
-            motion_rms,
-        }
-    }
-
     /// A gyro on the grid; `own` are the turns that it felt, `felt` those of all gyros: while the base turns, no axis of it is
     /// at rest.
     fn target(
@@ -385,17 +372,7 @@ impl<'a> Layout<'a> {
         let (scale, unit) = unit_of(channel);
         let (read, lost, guess) = self.given(channel, felt)?;
         let step = scale * (channel.lsb).unwrap_or_else(|| smallest_step(few(&channel.values)));
-        let is_rate = unit == "deg/s";
-        let mut jumps = match self.turns() {
-            true => Jumps::default(),
-            false => Jumps::of(&read, step),
-        };
-        let mut still = self.still((&read, &lost), &jumps, is_rate, (guess, rng));
-        if still.motion_rms > MOTION_RMS && !jumps.is_empty() {
-            // What moves without them moves, and they are part of that.
-            jumps = Jumps::default();
-            still = self.still((&read, &lost), &jumps, is_rate, (guess, rng));
-        }
+        let (mut jumps, still, knocks) = self.levelled(channel, (&read, &lost), guess, rng);
         let Still {
             given,
             lost,
@@ -413,13 +390,15 @@ impl<'a> Layout<'a> {
         } else {
             vec![]
         };
+        let mut spikes = [spikes, knocks.clone()].concat();
+        spikes.sort_unstable();
         let aside = self.aside(channel, &read, &spikes);
         let lost = [lost, spikes.clone()].concat();
         if still {
             let panel = Panel::of(dct, bins, c);
             c = fill::first(&channel.name, panel, &mut y, &lost, &mut fit);
         }
-        if is_rate && !spikes.is_empty() {
+        if unit == "deg/s" && !spikes.is_empty() {
             motion_rms = self.motion(&y, &c, &lost, &fit);
         }
         if !jumps.is_empty() {
@@ -435,6 +414,7 @@ impl<'a> Layout<'a> {
             coefficients: c,
             lost,
             spikes,
+            knocks,
             aside,
             jumps,
             explained: vec![],
@@ -473,25 +453,4 @@ impl<'a> Layout<'a> {
             table: true,
         }
     }
-}
-
-/// Whether the readings that there are are all the same.
-fn is_constant(y: &[f64]) -> bool {
-    let mut known = y.iter().filter(|v| v.is_finite());
-    let first = known.next();
-    known.all(|v| Some(v) == first)
-}
-
-/// Factor to the unit in which a gyro is searched, and that unit.
-fn unit_of(channel: &Channel) -> (f64, String) {
-    match channel.unit.as_str() {
-        "rad/s" => (180.0 / std::f64::consts::PI, "deg/s".to_owned()),
-        other => (1.0, other.to_owned()),
-    }
-}
-
-fn white_of(y: &[f64]) -> f64 {
-    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
-    let d: Vec<f64> = known.windows(2).map(|w| w[1] - w[0]).collect();
-    d.iter().map(|d| d * d).sum::<f64>() / (2.0 * d.len().max(1) as f64)
 }

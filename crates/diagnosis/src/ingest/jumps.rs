@@ -28,6 +28,8 @@ const ON_THE_WAY: usize = 3;
 const APART: f64 = 6.0;
 /// Standard deviations within which a reading lies at its level.
 const AT_LEVEL: f64 = 5.0;
+/// Part of a jump that is left of it where the level has come back.
+const BACK: f64 = 0.25;
 /// Readings in a record for each jump, at least: what jumps more often is a process, which a random walk stands for.
 const SELDOM: usize = 100;
 
@@ -121,6 +123,20 @@ impl Jumps {
         let n = readings as f64;
         let mean = level.iter().sum::<f64>() / n;
         (level.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+    }
+
+    /// Whether one of them comes back to the level before it within so many readings: something that is over, and no level that stays.
+    pub(super) fn come_back(&self, within: usize) -> bool {
+        let back = |(i, first): (usize, &Jump)| {
+            let mut off = first.height;
+            let soon = |jump: &&Jump| jump.at - first.at <= within;
+            let mut next = self.all[i + 1..].iter().take_while(soon);
+            next.any(|jump| {
+                off += jump.height;
+                off.abs() < BACK * first.height.abs()
+            })
+        };
+        !self.two_levels && self.all.iter().enumerate().any(back)
     }
 
     /// Whether there are none.

@@ -7,7 +7,8 @@ use model::effects::shock::LONGEST_S;
 use model::record::Quantity;
 
 use crate::fit::likelihood::Dct;
-use crate::ingest::base_turns::{Excursion, MOTION_RMS, excursions, largest_rate};
+use crate::ingest::base_turns::{Excursion, MOTION_RMS, excursions, largest_rate, overlap};
+use crate::ingest::handled::handled;
 use crate::ingest::types::Target;
 
 /// Largest share of another axis' rate that a gyro sees by its own fault: a mounting off by six degrees.
@@ -113,6 +114,18 @@ pub(crate) fn take_off(c: &mut [f64], drivers: &[Vec<f64>], band: Range<usize>) 
 /// Turns of a base at rest that a gyro felt, without those of which what drives its bias makes up most.
 pub(crate) fn felt(y: &[f64], others: &[Signal], rate_hz: f64, dct: &Dct) -> Vec<Excursion> {
     let mut found = excursions(y, rate_hz);
+    // One turn is told best by its shape; where it is but a part of what was done, by all of it.
+    for more in handled(y, rate_hz) {
+        let holds = |e: &Excursion| {
+            let own = e.with_margin(y.len());
+            own.start <= more.samples.start && more.samples.end <= own.end
+        };
+        if !found.iter().any(holds) {
+            found.retain(|e| !overlap(&e.samples, &more.samples));
+            found.push(more);
+        }
+    }
+    found.sort_by_key(|e| e.samples.start);
     // What is over sooner is a blow; the ends of a half sine may be found a third too far apart.
     found.retain(|e| e.samples.len() as f64 >= 4.0 / 3.0 * LONGEST_S * rate_hz);
     let drivers = others.iter().filter(|s| drives(s.quantity));

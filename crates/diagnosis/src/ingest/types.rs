@@ -30,6 +30,8 @@ pub struct Target {
     pub lost: Vec<usize>,
     /// Places whose reading the noise cannot have made.
     pub spikes: Vec<usize>,
+    /// Those of them that are over within two seconds, and would pass for a motion or for jumps.
+    pub knocks: Vec<usize>,
     /// Places whose reading is not believed, and what was read there.
     pub aside: Vec<(usize, f64)>,
     /// Where its level jumps and stays.

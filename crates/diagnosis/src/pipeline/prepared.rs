@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use model::effects::shock::LONGEST_S;
 use model::record::rows;
 use model::record::{AnalysisError, Base, Record};
 use model::record::{fills, sentinels};
@@ -13,7 +14,7 @@ use crate::attribute::masking;
 use crate::audit::{Audit, audit, sign_bit};
 use crate::ingest::blows::{Blow, blows};
 use crate::ingest::dead;
-use crate::ingest::grid::{lay_out, places_of_rows};
+use crate::ingest::grid::{lay_out, places_of_rows, with_knocks};
 use crate::ingest::lattice;
 use crate::ingest::types::{Grid, Target};
 use crate::result::{Finding, Input};
@@ -77,11 +78,22 @@ pub(super) fn prepared(record: Cow<'_, Record>, seed: u64) -> Result<Prepared, A
     let of_rows = |rows: &Vec<usize>| rows.iter().map(|r| places[*r]).collect();
     let singles = (audited.singles.iter()).map(|(name, rows)| (name.clone(), of_rows(rows)));
     let singles = singles.collect();
-    let blows = match bursts {
-        // What breaks off and begins anew at each of them is no blow.
+    // What breaks off and begins anew at each burst is no blow.
+    let knocked = |grid: &Grid| match bursts {
         Some(_) => vec![],
-        None => knocked(&grid, &singles),
+        None => knocked(grid, &singles),
     };
+    let mut blows = knocked(&grid);
+    let near = (LONGEST_S * grid.rate_hz) as usize;
+    let is_one = |at: &usize| {
+        let own = |b: &Blow| b.readings.start.saturating_sub(near)..b.readings.end + near;
+        blows.iter().any(|b| own(b).contains(at))
+    };
+    let mut left_out = grid.targets.iter().flat_map(|t| &t.knocks);
+    if left_out.any(|at| !is_one(at)) {
+        grid = with_knocks(record, &|name| audited.masked(name), seed)?;
+        blows = knocked(&grid);
+    }
     grid.bursts = bursts;
     let input = Input {
         file: String::new(),
@@ -170,7 +182,7 @@ impl Prepared {
             rows.dedup();
             rows
         };
-        if let Ok(grid) = lay_out(record, &masked, *seed) {
+        if let Ok(grid) = with_knocks(record, &masked, *seed) {
             (self.grid, self.blows) = (grid, blows);
         }
     }
