@@ -156,7 +156,6 @@ checks! {
     CrossCorrelationLate "cross_correlation_late" OMNIBUS_LEVEL, OfPair;
     ProcessSpectrum "process_spectrum" CLAIM_LEVEL, Named;
     ProcessLaw "process_law" CLAIM_LEVEL, Named;
-    ProcessSteadiness "process_steadiness" CLAIM_LEVEL, Named;
     ProcessLevels "process_levels" CLAIM_LEVEL, Named;
     ProcessDwells "process_dwells" CLAIM_LEVEL, Named;
     ProcessSize "process_size" CLAIM_LEVEL, Named;
@@ -240,7 +239,6 @@ impl CheckId {
             Self::Couplings => "it follows another channel as no cause does",
             Self::ProcessSpectrum
             | Self::ProcessLaw
-            | Self::ProcessSteadiness
             | Self::ProcessLevels
             | Self::ProcessDwells
             | Self::ProcessSize
@@ -289,10 +287,9 @@ impl CheckId {
     }
 
     /// What the name of a process claims.
-    pub const OF_PROCESS: [Self; 7] = [
+    pub const OF_PROCESS: [Self; 6] = [
         Self::ProcessSpectrum,
         Self::ProcessLaw,
-        Self::ProcessSteadiness,
         Self::ProcessLevels,
         Self::ProcessDwells,
         Self::ProcessSize,

@@ -424,11 +424,7 @@ pub(crate) fn no_turn(
         return Some("the level is another one after it");
     }
     let fastest = (FASTEST / turn.samples.len().max(1) as f64).min(1.0);
-    let wandering = [
-        CheckId::ProcessLaw,
-        CheckId::ProcessLevels,
-        CheckId::ProcessSteadiness,
-    ];
+    let wandering = [CheckId::ProcessLaw, CheckId::ProcessLevels];
     let notes = (s.state.notes.iter())
         .any(|note| note.at.is_empty() || note.at.iter().any(|(from, _)| from / PI < fastest));
     let mut left = residual::failing_bands(&s.u).chain(residual::unsteady(&s.e));

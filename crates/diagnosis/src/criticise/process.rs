@@ -12,7 +12,6 @@
 //!   tails by its name long ones alone are asked.
 //! * Levels: Cox's test of how far two levels are ahead or behind (`contest`).
 //! * Dwells: Bartlett's test of whether two levels switch at random (`contest::dwells`).
-//! * Steadiness: energies of what drives it in stretches of the record, whose variance follows from the sum of r^2.
 //! * Source: what it knows nothing of, by its mean (`source`).
 //! * Size: the same energy against temperature, supply and command and what stands in the model beside it, a line say, and against
 //!   their squares: it knows nothing of them.
@@ -44,8 +43,6 @@ const MORE: f64 = 4.0;
 const BENDS: usize = 6;
 /// Fewest independent values that a bend or a moment may rest on.
 const LEAST: f64 = 24.0;
-/// Stretches of the record.
-const STRETCHES: usize = 12;
 /// The same for a course over the whole record.
 const LEAST_OF_COURSE: f64 = 4.0 * LEAST;
 /// Part of its energy, rms, that may follow what else was recorded: its size is then off by a tenth.
@@ -132,17 +129,16 @@ pub(crate) fn of_processes(
     all
 }
 
-/// What a process claims of its shape, law, steadiness and size.
-fn claims(term: &Term) -> [Option<CheckId>; 4] {
+/// What a process claims of its shape, law and size.
+fn claims(term: &Term) -> [Option<CheckId>; 3] {
     if term.is_band() {
         // Whether it is Gaussian and steady, the envelope of a band has told.
         let (shape, size) = (CheckId::BandSpectrum, CheckId::BandSize);
-        return [Some(shape), None, None, Some(size)];
+        return [Some(shape), None, Some(size)];
     }
     [
         Some(CheckId::ProcessSpectrum),
         Some(CheckId::ProcessLaw),
-        Some(CheckId::ProcessSteadiness),
         Some(CheckId::ProcessSize),
     ]
 }
@@ -218,8 +214,8 @@ struct Process<'a> {
     id: &'static str,
     /// Whether it is Gaussian.
     is_normal: bool,
-    /// Its claims of shape, law, steadiness and size.
-    claims: [Option<CheckId>; 4],
+    /// Its claims of shape, law and size.
+    claims: [Option<CheckId>; 3],
     /// Rms by which its density may be off, as a part of it, whatever the chance.
     off: f64,
     /// Independent values that its energies rest on, over those that others do.
@@ -400,7 +396,7 @@ impl Process<'_> {
         Some(law.iter().map(size).collect())
     }
 
-    /// Whether it is Gaussian, and there all the time.
+    /// Whether it is Gaussian, and of a size that follows nothing.
     fn in_time(&self) -> Vec<Outcome> {
         let bins = &self.panel.bins;
         let g = self.state.noise.everywhere(bins);
@@ -432,17 +428,8 @@ impl Process<'_> {
             let what = format!("{name}, in standard errors of a Gaussian one");
             Some(self.outcome(self.claims[1]?, z, p, what))
         });
-        let steadiness = drive.steadiness(self.more).and_then(|(statistic, p, j, energy)| {
-            let length = self.u.len() as f64 / self.view.rate_hz / STRETCHES as f64;
-            let what = format!(
-                "it is not there all the time alike; {energy:.2} of its mean from {:.0} to {:.0} s",
-                j as f64 * length,
-                (j + 1) as f64 * length
-            );
-            Some(self.outcome(self.claims[2]?, statistic, p, what))
-        });
         let size = self.size(&drive);
-        law.into_iter().chain(steadiness).chain(size).collect()
+        law.into_iter().chain(size).collect()
     }
 
     /// What the terms of the model with a course of their own make in time, by the title of their effect.
@@ -473,7 +460,7 @@ impl Process<'_> {
         let chance = (asked.len() as f64 * chi_tail(*statistic, 2.0)).min(1.0);
         let p = if *depth < DEPTH { 1.0 } else { chance };
         let what = format!("its energy follows {name}, by {:.0} % rms", 100.0 * depth);
-        let outcome = self.outcome(self.claims[3]?, *statistic, p, what);
+        let outcome = self.outcome(self.claims[2]?, *statistic, p, what);
         Some(Outcome {
             about: recorded.then(|| (*name).to_owned()).into_iter().collect(),
             ..outcome

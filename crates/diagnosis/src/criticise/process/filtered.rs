@@ -1,9 +1,9 @@
-//! What passes a filter, in time: its moments, and its energy by stretches and by courses.
+//! What passes a filter, in time: its moments, and its energy by courses.
 
-use super::{LEAST, LEAST_OF_COURSE, ROUNDING, STRETCHES, powers};
+use super::{LEAST, LEAST_OF_COURSE, ROUNDING, powers};
 use crate::fit::likelihood::Panel;
 use numerics::column::dot;
-use numerics::tails::{chi_tail, kurtosis_score};
+use numerics::tails::kurtosis_score;
 
 /// Whitened coefficients behind a filter, in time over the standard deviations that they have there, and how such values correlate.
 pub(super) struct Filtered {
@@ -42,29 +42,6 @@ impl Filtered {
         let fourth = mean(4) / (variance * variance);
         let kurtosis = independent(self.sums[2]).map_or(f64::NAN, |n| kurtosis_score(fourth, n));
         [("skewness", skewness), ("kurtosis", kurtosis)]
-    }
-
-    /// Sum of the squared deviations of the energies in stretches, its chance, the stretch that is farthest off and its
-    /// energy over the mean.
-    pub(super) fn steadiness(&self, more: f64) -> Option<(f64, f64, usize, f64)> {
-        let length = self.values.len() / STRETCHES;
-        if (length as f64) < more * LEAST * self.sums[0] {
-            return None;
-        }
-        let energies: Vec<f64> = self
-            .values
-            .chunks_exact(length)
-            .take(STRETCHES)
-            .map(|c| c.iter().map(|v| v * v).sum::<f64>() / length as f64)
-            .collect();
-        let mean = energies.iter().sum::<f64>() / STRETCHES as f64;
-        let variance = 2.0 * self.sums[0] / length as f64;
-        let off = |e: &f64| (e / mean - 1.0).powi(2) / variance;
-        let statistic: f64 = energies.iter().map(off).sum();
-        let worst =
-            (0..STRETCHES).max_by(|a, b| off(&energies[*a]).total_cmp(&off(&energies[*b])))?;
-        let chance = chi_tail(statistic, STRETCHES as f64 - 1.0);
-        Some((statistic, chance, worst, energies[worst] / mean))
     }
 
     /// Chi-square of two degrees of the energy against a course and its square, and the part of the energy, rms, that

@@ -21,7 +21,7 @@ fn filtered(seed: u64) -> Filtered {
 }
 
 #[test]
-fn moments_and_energies_of_a_gaussian_process_are_as_far_off_as_their_errors_say() {
+fn moments_of_a_gaussian_process_are_as_far_off_as_their_errors_say() {
     let runs = 400;
     let all: Vec<Filtered> = (0..runs).map(filtered).collect();
     let z: Vec<f64> = all.iter().flat_map(|f| f.moments().map(|m| m.1)).collect();
@@ -30,10 +30,6 @@ fn moments_and_energies_of_a_gaussian_process_are_as_far_off_as_their_errors_say
     assert!((spread - 1.0).abs() < 0.1, "{spread}");
     let far = z.iter().filter(|z| z.abs() > 3.3).count();
     assert!(far <= 5, "{far}");
-    let unsteady = all.iter().filter(|f| f.steadiness(1.0).unwrap().1 < 0.01);
-    let unsteady = unsteady.count();
-    // 4 are expected.
-    assert!(unsteady <= 12, "{unsteady}");
 }
 
 #[test]
@@ -61,10 +57,9 @@ fn a_size_that_follows_a_thermometer_is_told_and_one_that_does_not_is_not() {
 }
 
 #[test]
-fn a_process_that_stops_half_way_is_unsteady_and_has_tails() {
+fn a_process_that_stops_half_way_has_tails() {
     let mut f = filtered(7);
     f.values[3000..].iter_mut().for_each(|v| *v *= 0.3);
-    assert!(f.steadiness(1.0).unwrap().1 < 1e-9);
     assert!(f.moments()[1].1 > 4.0);
 }
 
