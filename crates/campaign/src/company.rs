@@ -1,10 +1,12 @@
 //! Effects in company: two in a run, two or three on one axis, and one on an axis that has a structure of another kind.
 //! The strength of each is that beside the others.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use crate::foreign::words::{phasor, white};
-use crate::plant::{STRONG, StrongRow as Row, Truth, plant, plant_outliers, strong};
+use crate::plant::{
+    LARGEST_RMS, STRONG, StrongRow as Row, TURNS_BELOW_HZ, Truth, plant, plant_outliers, strong,
+};
 use crate::random::Draw;
 use crate::series::{each, each_pair};
 use crate::stand::{GYROS, Stand};
@@ -196,9 +198,16 @@ pub const STRUCTURES: [StructureKind; 5] = [
 /// Strengths of a line or a band that an effect is planted beside.
 const LOUD: (f64, f64) = (15.0, 40.0);
 
+/// Drawn again where it is a turn of the base to anyone who has the gyro alone, as what moves much below 1 Hz is.
 fn line(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {
-    let wanted = draw.by_ratio(LOUD.0, LOUD.1);
-    Structure::of(plant(draw, stand, "line", axis, wanted))
+    loop {
+        let wanted = draw.by_ratio(LOUD.0, LOUD.1);
+        let truth = plant(draw, stand, "line", axis, wanted);
+        let [hz, amplitude] = ["frequency", "amplitude"].map(|name| truth.parameters[name].value);
+        if hz > TURNS_BELOW_HZ || amplitude * FRAC_1_SQRT_2 < LARGEST_RMS {
+            return Structure::of(truth);
+        }
+    }
 }
 
 fn band(draw: &mut Draw, stand: &mut Stand, axis: usize) -> Structure {

@@ -18,7 +18,7 @@ mod counted;
 mod strong;
 
 pub use counted::COUNTED;
-pub use strong::STRONG;
+pub use strong::{LARGEST_RMS, STRONG, TURNS_BELOW_HZ};
 
 /// An effect of the library, as the campaign plants it: a row of its tables.
 #[derive(Clone, Copy)]

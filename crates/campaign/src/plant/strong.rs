@@ -50,7 +50,9 @@ pub const STRONG: [Row; 25] = [
 
 /// Largest process, deg/s rms: slower ones, which a random walk hides better, would need more for the strength, and what
 /// moves that much below 1 Hz is a turn of the base to anyone who has the gyro alone.
-const LARGEST_RMS: f64 = 0.25;
+pub const LARGEST_RMS: f64 = 0.25;
+/// Below that frequency, Hz.
+pub const TURNS_BELOW_HZ: f64 = 1.0;
 
 /// A shape whose size is one parameter.
 fn size(stand: &Stand, asked: Asked, name: &'static str) -> Drawn {
