@@ -92,7 +92,7 @@ pub fn instability(of: &Diagnosed, channel: &str) -> Option<String> {
     let limit = limits.find(|l| l.cause == flicker::ID && l.channel == channel)?;
     let size = number(limit.value, 2);
     Some(format!(
-        "< {size} {} (more would have been found)",
+        "< {size} {} (none found; 95 % of larger ones would show)",
         limit.unit
     ))
 }
@@ -175,7 +175,7 @@ mod tests {
         );
         assert_eq!(
             said(&of, "gyro_y").as_deref(),
-            Some("< 169 deg/h (more would have been found)")
+            Some("< 169 deg/h (none found; 95 % of larger ones would show)")
         );
         assert_eq!(said(&of, "gyro_z"), None);
         // A term of the model that is no finding.
