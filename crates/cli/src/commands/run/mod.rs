@@ -216,8 +216,10 @@ fn show(arguments: &Arguments, record: &Record, link: &LinkCounts, found: &Answe
         true => say!("{}", text::details(&found.diagnosis).trim_end()),
         false => say!("{}", text::MORE),
     }
-    let compared = found.comparison.wrapped();
-    say!("\nplanted and found\n{}\n{compared}", text::item("", RULE));
+    let lines = found.comparison.lines();
+    say!("\nplanted and found\n{}", text::item("", RULE));
+    // One line each, not wrapped.
+    lines.iter().for_each(|line| say!("    {line}"));
     if let Some(page) = &arguments.report {
         say!("report: {}", page.display());
     }

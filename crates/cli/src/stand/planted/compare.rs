@@ -6,7 +6,7 @@ use diagnosis::result::{Diagnosis, Finding, Parameter};
 use serde::Serialize;
 
 use super::{Planted, Size};
-use crate::text::{item, measured, rounded_as};
+use crate::text::{measured, rounded_as};
 
 /// Standard errors on either side of an estimate that hold the truth 95 times of 100.
 const NORMAL_95: f64 = 1.96;
@@ -192,19 +192,6 @@ impl Comparison {
             (false, false) => lines.push(format!("found besides: {}", self.besides.join("; "))),
         }
         lines
-    }
-}
-
-impl Comparison {
-    /// The same for a terminal, wrapped.
-    #[must_use]
-    pub fn wrapped(&self) -> String {
-        let lines = self.lines();
-        let wrapped = lines.iter().map(|line| {
-            let text = line.trim_start();
-            item(&line[..line.len() - text.len()], text)
-        });
-        wrapped.collect::<Vec<_>>().join("\n")
     }
 }
 

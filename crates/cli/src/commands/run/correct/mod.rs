@@ -403,7 +403,11 @@ impl Loop<'_> {
             return;
         }
         if let Some(comparison) = &answer.planted {
-            say!("planted and found\n{}", comparison.wrapped());
+            say!("planted and found");
+            comparison
+                .lines()
+                .iter()
+                .for_each(|line| say!("    {line}"));
         }
         answer.lines().iter().for_each(|line| say!("{line}"));
     }
