@@ -95,6 +95,7 @@ fn entry(left: &Unexplained) -> Markup {
         div {
             (left.what)
             @if let Some(c) = &left.consequence { ". " (with_code(&answer::consequence_of(c, left.material))) }
+            @if let Some(text) = answer::lines(left) { " " (text) }
             @if let Some(text) = answer::modelled(left) { " " (text) }
             @if !left.details.is_empty() {
                 details.fold {

@@ -8,6 +8,7 @@ use super::verdict;
 const NOT_READ: &str =
     "Look to the sensor, its supply and the column: nothing can be said of what was not measured.";
 const MADE: &str = "Look to how the readings are made, from the converter to the file: bits, digits, filters and words of the bus. A longer record shows the same.";
+const LINES: &str = "Find what turns, switches or hums at these frequencies: stop it, isolate the sensor, or notch them. Record at another rate too: a line that moves is an alias.";
 const NOISE: &str = "Record again, twice as long: what comes again belongs to the sensor or the stand. The report shows where it lies.";
 
 /// A sentence for each kind of thing among some entries.
@@ -16,7 +17,7 @@ pub fn of<'a>(all: impl Iterator<Item = &'a Unexplained>) -> Vec<&'static str> {
     if told.iter().any(|t| *t != NOT_READ) {
         told.retain(|t| *t != NOT_READ);
     }
-    [NOISE, MADE, NOT_READ]
+    [LINES, NOISE, MADE, NOT_READ]
         .into_iter()
         .filter(|t| told.contains(t))
         .collect()
@@ -32,6 +33,8 @@ fn of_one(left: &Unexplained) -> &'static str {
         NOT_READ
     } else if !verdict::was_read(left) || of(Domain::Codes) || of(Domain::Readings) {
         MADE
+    } else if !left.lines.is_empty() {
+        LINES
     } else {
         NOISE
     }
@@ -63,5 +66,11 @@ mod tests {
         assert_eq!(of(all[..1].iter()), [NOISE]);
         assert_eq!(of(all[2..].iter()), [NOT_READ]);
         assert_eq!(of([Unexplained::default()].iter()), [MADE]);
+        let comb = Unexplained {
+            rms: Some(0.1),
+            lines: vec![std::collections::BTreeMap::new()],
+            ..Unexplained::default()
+        };
+        assert_eq!(of([comb].iter()), [LINES]);
     }
 }

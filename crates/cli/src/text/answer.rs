@@ -208,6 +208,24 @@ fn named(finding: &Finding) -> Vec<(&String, &Parameter)> {
     first.into_iter().chain(then).take(NAMED).collect()
 }
 
+/// Lines that a sentence lists; the file has them all.
+const LISTED: usize = 4;
+
+/// The lines that an entry is made of, the largest first, where it is.
+#[must_use]
+pub fn lines(left: &Unexplained) -> Option<String> {
+    let of = |line: &Parameters| {
+        let (size, pitch) = (line.get("amplitude")?, line.get("frequency")?);
+        Some(format!("{} at {:.4} Hz", with_interval(size), pitch.value))
+    };
+    let told: Vec<String> = left.lines.iter().filter_map(of).take(LISTED).collect();
+    let more = match left.lines.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(", and {more} smaller"),
+    };
+    (!told.is_empty()).then(|| format!("Amplitudes: {}{more}.", told.join(", ")))
+}
+
 /// How the model has what has no name.
 #[must_use]
 pub fn modelled(left: &Unexplained) -> Option<String> {

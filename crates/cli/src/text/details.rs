@@ -48,7 +48,10 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             let cost = answer::consequence_of(c, left.material);
             let _ = writeln!(out, "{}", item("", &cost));
         }
-        if let Some(text) = answer::modelled(left) {
+        for text in [answer::lines(left), answer::modelled(left)]
+            .into_iter()
+            .flatten()
+        {
             let _ = writeln!(out, "{}", item("", &text));
         }
         for seen in &left.details {

@@ -136,6 +136,9 @@ fn write_unexplained(out: &mut String, all: &[Unexplained]) {
             let cost = answer::consequence_of(c, left.material);
             let _ = writeln!(out, "{}", item("", &cost));
         }
+        if let Some(lines) = answer::lines(left) {
+            let _ = writeln!(out, "{}", item("", &lines));
+        }
         if let Some(of) = &left.follows {
             let next = format!(
                 "What to do: change {of} alone and record again; where {} follows again, subtract what follows it.",

@@ -32,6 +32,8 @@ enum Doubt {
     No,
     /// A check fails where the term acts.
     Checks,
+    /// It is one of several lines that one motion makes; nothing is left beside them.
+    OneMotion,
     /// It follows any smooth spectrum, and this one is no filter's.
     Spectrum,
     /// It swings at the frequency of the channel of this name, or is a shape of time beside what does: that follows late.
@@ -64,6 +66,21 @@ pub(crate) fn nearest_of(channel: &str, all: &[Finding]) -> Observation {
     let titles = all.iter().filter_map(|f| effect(&f.cause));
     Observation {
         nearest: titles.map(|e| e.docs().title).collect(),
+        ..Observation::of_noise(channel, what)
+    }
+}
+
+/// The lines that one motion makes on a channel, the largest first.
+fn lines_of_one_motion(channel: &str, all: &[Finding]) -> Observation {
+    let size = |f: &Finding| f.parameters.get("amplitude").map_or(0.0, |p| p.value);
+    let mut all: Vec<&Finding> = all.iter().collect();
+    all.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    let told: Vec<&str> = all.iter().map(|f| f.what.as_str()).collect();
+    let titles = all.iter().filter_map(|f| effect(&f.cause));
+    let what = format!("the model has it as {}", told.join("; "));
+    Observation {
+        nearest: titles.map(|e| e.docs().title).collect(),
+        lines: all.iter().map(|f| f.parameters.clone()).collect(),
         ..Observation::of_noise(channel, what)
     }
 }
@@ -111,7 +128,7 @@ pub(crate) fn withdraw(
     let name = s.target.name.as_str();
     let mut unexplained = vec![];
     let standing = fallen(s, &terms);
-    let (mut kept, mut nearest, mut beside) = (vec![], vec![], vec![]);
+    let (mut kept, mut nearest, mut beside, mut lines) = (vec![], vec![], vec![], vec![]);
     for ((finding, doubt), term) in of_terms.into_iter().zip(terms).zip(&s.state.terms) {
         // It is told with the band that it is a part of.
         if term.is_part() {
@@ -124,6 +141,7 @@ pub(crate) fn withdraw(
             match doubt {
                 Doubt::No => kept.push(finding),
                 Doubt::Checks => nearest.push(finding),
+                Doubt::OneMotion => lines.push(finding),
                 Doubt::Spectrum => {
                     let what =
                         "the noise has a smooth spectrum that no effect of the library makes";
@@ -163,6 +181,10 @@ pub(crate) fn withdraw(
     }
     if !nearest.is_empty() {
         unexplained.push(nearest_of(name, &nearest));
+    }
+    if !lines.is_empty() {
+        unexplained.push(lines_of_one_motion(name, &lines));
+        nearest.append(&mut lines);
     }
     if let Some(seen) = unexplained.first_mut() {
         seen.terms = standing;

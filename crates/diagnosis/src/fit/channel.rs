@@ -23,6 +23,9 @@ pub const RIVAL_SPAN: f64 = 6.0;
 /// Place of the correlation time of its pitch among what is stated of a tone that was tracked.
 const PITCH_TIME: usize = 4;
 
+/// Half widths about the centre of a band that hold what it explains.
+pub(crate) const BAND_REACH: f64 = 3.0;
+
 /// Largest width at half power over the centre: a mode of a lower quality factor than 3 is hardly one, and what wanders, bent
 /// by what a random walk takes up, has such a peak.
 const NARROW: f64 = 1.0 / 3.0;

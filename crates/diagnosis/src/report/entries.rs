@@ -74,6 +74,7 @@ fn plain(group: &[Observation]) -> Unexplained {
             _ => group.iter().map(|o| o.what.clone()).collect(),
         },
         follows: group.iter().find_map(|o| o.follows.first().cloned()),
+        lines: group.iter().flat_map(|o| o.lines.iter().cloned()).collect(),
         checks: checks.into_iter().map(String::from).collect(),
         material: true,
         ..Unexplained::default()

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use model::effect::Parameters;
 use serde::{Deserialize, Serialize};
 
 /// What something does to a channel.
@@ -58,6 +59,9 @@ pub struct Unexplained {
     /// Times of its events, s from the start.
     #[serde(default)]
     pub times_s: Vec<f64>,
+    /// Frequency, amplitude and phase of each line that it is made of, the largest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<Parameters>,
     /// The recorded channel that it follows.
     #[serde(default)]
     pub follows: Option<String>,

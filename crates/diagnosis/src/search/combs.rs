@@ -1,11 +1,11 @@
-//! Lines of which one motion makes several: a comb of harmonics, or more of them than separate causes make.
+//! Lines of which one motion makes several: a comb of harmonics, side bands, a band or a chirp.
 
 use std::f64::consts::{PI, TAU};
 
 use model::effect::Peak;
 
 use super::{MOST_ALIKE, MOST_TERMS, Search};
-use crate::fit::channel::{Form, Note, State, Term, whitened};
+use crate::fit::channel::{BAND_REACH, Form, Note, State, Term, whitened};
 use crate::fit::{about_line, scan, threshold};
 
 /// Part of its frequency by which a crowd of lines reaches beyond the outermost ones.
@@ -85,6 +85,33 @@ fn comb(lines: &[Line], per_record: f64) -> Option<(f64, Vec<u32>)> {
     })
 }
 
+/// Largest multiple of a line in a relation of three: side bands of a tone whose pitch or size swings, tones of a mixer.
+const LARGEST_ORDER: i32 = 3;
+
+/// Whether three of the lines stand in a relation of small whole numbers, or two lie at a multiple: one motion makes them. Of lines with
+/// nothing to do with each other that happens by chance only.
+fn are_related(lines: &[Line], per_record: f64) -> bool {
+    let within = |terms: &[(i32, &Line)]| {
+        let sum: f64 = terms.iter().map(|(k, l)| f64::from(*k) * l.0).sum();
+        let errors = terms
+            .iter()
+            .map(|(k, l)| f64::from(*k) * error(l, per_record));
+        sum.abs() < 3.0 * errors.map(|e| e * e).sum::<f64>().sqrt()
+    };
+    let orders = || (-LARGEST_ORDER..=LARGEST_ORDER).filter(|k| *k != 0);
+    let three = |a: &Line, b: &Line, c: &Line| {
+        (1..=LARGEST_ORDER)
+            .any(|k| orders().any(|l| orders().any(|m| within(&[(k, a), (l, b), (m, c)]))))
+    };
+    lines.iter().enumerate().any(|(i, a)| {
+        let beyond = &lines[i + 1..];
+        beyond.iter().enumerate().any(|(j, b)| {
+            harmonics(&[*a, *b], per_record).is_some()
+                || beyond[j + 1..].iter().any(|c| three(a, b, c))
+        })
+    })
+}
+
 impl Search<'_> {
     /// The lines of a state.
     fn lines_of(&self, state: &State) -> Vec<Line> {
@@ -116,11 +143,31 @@ impl Search<'_> {
         }
     }
 
-    /// How many terms there may be beside the state's comb of lines, where it has one: its teeth are one motion.
+    /// How many terms there may be beside the state's lines: the teeth of a comb are one motion, and steady lines that have nothing
+    /// to do with each other take no room from other causes.
     fn most_terms(&self, state: &State) -> usize {
         let lines = self.lines_of(state);
-        let comb = lines.len() > MOST_ALIKE && comb(&lines, self.per_record()).is_some();
-        MOST_TERMS + if comb { lines.len() } else { 0 }
+        let known =
+            || comb(&lines, self.per_record()).is_some() || self.are_separate(state, &lines);
+        let many = lines.len() > MOST_ALIKE && known();
+        MOST_TERMS + if many { lines.len() } else { 0 }
+    }
+
+    /// Whether each of the lines is steady, and none has to do with another: as many causes.
+    fn are_separate(&self, state: &State, lines: &[Line]) -> bool {
+        // A few periods are a piece of any slow course.
+        let slowest = lines.iter().map(|l| l.0).fold(f64::INFINITY, f64::min);
+        2.0 * slowest >= about_line::BESIDE * self.per_record()
+            && !are_related(lines, self.per_record())
+            && !lines.iter().any(|line| self.is_in_a_band(state, line))
+            && self.are_steady(state)
+    }
+
+    /// Whether a line lies within a band of the state: several such are pieces of what has that spectrum.
+    fn is_in_a_band(&self, state: &State, line: &Line) -> bool {
+        let omega = line.0 * TAU / self.view.rate_hz;
+        let mut bands = state.terms.iter().filter_map(Term::peak);
+        bands.any(|p| (omega - p.omega).abs() < BAND_REACH * p.half_width)
     }
 
     /// The state with every tooth of the comb that its lines are of which the record shows; none where it has them all.
@@ -202,7 +249,7 @@ impl Search<'_> {
         } else {
             harmonics(&lines, self.per_record())
         };
-        if !many && repeats.is_none() {
+        if repeats.is_none() && (!many || self.are_separate(state, &lines)) {
             return None;
         }
         let steady = repeats.is_some() || self.are_steady(state);
@@ -215,7 +262,7 @@ impl Search<'_> {
                 multiples(fundamental, &teeth)
             ),
             None if steady => format!(
-                "{} steady lines from {:.3} to {:.3} Hz: more than single causes make",
+                "{} steady lines from {:.3} to {:.3} Hz, of one motion: some are sums or multiples of others",
                 lines.len(),
                 ends.0,
                 ends.1
@@ -313,6 +360,20 @@ mod tests {
         // Without the fundamental: their distance tells it.
         let odd = [(1.4624, 60.0), (2.1936, 60.0), (5.1184, 60.0)];
         assert_eq!(comb(&odd, per_record).unwrap().1, vec![2, 3, 7]);
+    }
+
+    #[test]
+    fn side_bands_are_related_and_tones_of_several_machines_are_not() {
+        let of = |hz: &[f64]| -> Vec<Line> { hz.iter().map(|f| (*f, 200.0)).collect() };
+        let per_record = 1.0 / 600.0;
+        assert!(are_related(&of(&[7.31, 7.66, 8.01]), per_record));
+        // The carrier, and the second side band of one side, are below the noise.
+        assert!(are_related(&of(&[7.31, 8.01, 8.71, 5.0]), per_record));
+        assert!(are_related(&of(&[2.137, 4.274, 8.9]), per_record));
+        assert!(!are_related(
+            &of(&[2.137, 5.0291, 8.914, 9.3377]),
+            per_record
+        ));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What was seen and has no name, before what belongs together is one entry.
 
+use model::effect::Parameters;
+
 use super::CheckId;
 
 /// What kind of thing an observation is of.
@@ -35,6 +37,8 @@ pub struct Observation {
     pub correlation: Option<f64>,
     /// Places, among the terms of the channel's model, of those that stand for it there.
     pub terms: Vec<usize>,
+    /// Parameters of each line that it is made of, the largest first.
+    pub lines: Vec<Parameters>,
     /// Lowest and highest frequency, as shares of half the sample rate, where it has such a place.
     pub place: Option<[f64; 2]>,
     /// Whether it says what the structure is that checks see parts of.

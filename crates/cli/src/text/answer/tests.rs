@@ -243,3 +243,22 @@ fn nobody_asks_again_what_the_base_did() {
         "{said}"
     );
 }
+
+#[test]
+fn the_largest_lines_of_an_entry_are_listed_with_intervals_and_the_others_counted() {
+    let line = |hz: f64| {
+        let p = |value, error, unit| Parameter::estimated(value, error, unit);
+        Parameters::from([
+            ("amplitude".to_owned(), p(0.5, 0.01, "deg/s")),
+            ("frequency".to_owned(), p(hz, 1e-5, "Hz")),
+        ])
+    };
+    let left = |count: u32| Unexplained {
+        lines: (1..=count).map(|k| line(8.5 * f64::from(k))).collect(),
+        ..Unexplained::default()
+    };
+    assert_eq!(lines(&left(0)), None);
+    let one = "Amplitudes: 0.500 deg/s (95\u{a0}%: 0.480 to 0.520) at 8.5000 Hz.";
+    assert_eq!(lines(&left(1)).as_deref(), Some(one));
+    assert!(lines(&left(6)).is_some_and(|text| text.ends_with(" at 34.0000 Hz, and 2 smaller.")));
+}

@@ -69,8 +69,8 @@ pub(super) struct Facts<'a> {
     pub counts: Vec<f64>,
     /// Everything that is left and has a place in frequency.
     pub places: Vec<Place>,
-    /// Crowds of lines.
-    crowds: Vec<Place>,
+    /// Crowds of lines: those of which something is left, and those that the terms hold.
+    crowds: [Vec<Place>; 2],
     /// Where the energy comes and goes.
     unsteady: Vec<Place>,
     /// What comes again and again.
@@ -125,7 +125,7 @@ impl<'a> Facts<'a> {
             left,
             counts: panel.bins.products(&ones, &ones),
             places,
-            crowds: of(true).chain(of(false)).collect(),
+            crowds: [false, true].map(|held| of(held).collect()),
             unsteady,
             repeats: residual::repeats(&s.e).filter(|r| r.chance < omnibus_level()),
             bent: 0.0,
@@ -157,9 +157,11 @@ impl<'a> Facts<'a> {
         self.places.iter().any(|p| in_place(p, omega))
     }
 
-    /// Whether a line lies in a crowd of others.
-    pub(super) fn in_crowd(&self, omega: f64) -> bool {
-        self.crowds.iter().any(|p| in_place(p, omega))
+    /// Whether a line lies in a crowd of others that the terms of the model hold, or leave something of.
+    pub(super) fn in_crowd(&self, omega: f64, held: bool) -> bool {
+        self.crowds[usize::from(held)]
+            .iter()
+            .any(|p| in_place(p, omega))
     }
 
     /// Whether a line is a harmonic of what repeats itself, in its mean or in its variance, to a coefficient.

@@ -7,13 +7,11 @@ use std::ops::Range;
 use model::effect::Peak;
 
 use super::facts::Facts;
-use crate::fit::channel::Term;
+use crate::fit::channel::{BAND_REACH, Term};
 use crate::search::band_source::{FOLLOWED, coherence};
 use crate::test_level::CheckId;
 
-/// Half widths about the centre of a band that hold what it explains, and the share of that which a follower has there, from
-/// which on the band may be what its shape leaves.
-const BAND_REACH: f64 = 3.0;
+/// Share of what a band explains that a follower has at its place, from which on the band may be what its shape leaves.
 const OF_BAND: f64 = 0.5;
 
 /// What a band explains, with those that it is one with.

@@ -78,7 +78,7 @@ const TERMS: &[Rule] = &[
     Rule {
         name: "a line in a crowd of lines is one of a band",
         of: line,
-        holds: |f, t| t.line().is_some_and(|omega| f.in_crowd(omega)),
+        holds: |f, t| t.line().is_some_and(|omega| f.in_crowd(omega, false)),
     },
     Rule {
         name: "a line at a harmonic of what repeats itself is a part of that",
@@ -261,6 +261,9 @@ pub(super) fn doubt_of(f: &Facts<'_>, t: &Seen<'_>) -> Doubt {
     }
     if TERMS.iter().any(|r| (r.of)(t) && (r.holds)(f, t)) {
         return Doubt::Checks;
+    }
+    if t.line().is_some_and(|omega| f.in_crowd(omega, true)) {
+        return Doubt::OneMotion;
     }
     let may_be = of_no_channel(t) && !line(t);
     match may_be.then(|| f.remainder(t.term)).flatten() {
