@@ -173,3 +173,48 @@ fn side_bands_of_a_pitch_that_sways_are_no_lines_of_their_own() {
     });
     assert!(right.is_ok(), "seed {seed}: {}", right.unwrap_err());
 }
+
+/// Single readings that lie farther from the rest than the noise, and no farther than a line swings.
+#[test]
+fn single_far_readings_beside_strong_lines_are_counted() {
+    let seed = draws::seed(20_261_134);
+    let right = draws::graded(20, 18, |draw| {
+        let rng = &mut rng_of(seed, draw);
+        let (rate_hz, seconds) = drawn(rng);
+        let line = |_| Line {
+            hz: between(0.05, 0.45, rng) * rate_hz,
+            amplitude: SIGMA * by_ratio(0.5, 6.0, rng),
+            phase: between(0.0, TAU, rng),
+        };
+        let lines: Vec<Line> = (0..2).map(line).collect();
+        let (count, far) = (between(6.0, 30.0, rng).floor(), between(10.0, 30.0, rng));
+        let every = (rate_hz * seconds / count) as usize;
+        let first = between(0.0, every as f64, rng) as usize;
+        let signal = |t: f64| {
+            let at = (t * rate_hz).round() as usize + first;
+            let wild = match at % every {
+                0 if (at / every).is_multiple_of(2) => far * SIGMA,
+                0 => -far * SIGMA,
+                _ => 0.0,
+            };
+            wild + lines.iter().map(|l| l.at(t)).sum::<f64>()
+        };
+        let d = told((rate_hz, seconds), signal, rng);
+        let planted =
+            (0..(rate_hz * seconds) as usize).filter(|i| (i + first).is_multiple_of(every));
+        let planted = planted.count() as f64;
+        let counted = |name: &str| {
+            let all = d.findings.iter().filter(|f| f.cause == name);
+            all.map(|f| f.parameters.get("count").map_or(1.0, |p| p.value))
+                .sum::<f64>()
+        };
+        let all = (counted("outliers") - planted).abs() <= 1.0 && counted("line") == 2.0;
+        all.then_some(()).ok_or_else(|| {
+            format!(
+                "{planted} of {far:.0} sigma at {rate_hz:.0} Hz: {}",
+                said(&d)
+            )
+        })
+    });
+    assert!(right.is_ok(), "seed {seed}: {}", right.unwrap_err());
+}

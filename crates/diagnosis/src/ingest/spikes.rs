@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::fit::likelihood::{Bins, Dct, Noise, Panel};
 use crate::ingest::kalman;
-use numerics::order_statistics::median;
+use numerics::order_statistics::{median, robust_sigma};
 use numerics::tails;
 
 /// Fewest readings that tell how loud it is about them, and how many such stretches a record has at most.
@@ -43,6 +43,28 @@ fn loudness(e: &[f64], given: &[f64], least: usize) -> Vec<f64> {
     (0..e.len()).map(|i| all[i / length]).collect()
 }
 
+/// What white noise and a random walk of that density, over `white`, leave of readings, in standard deviations of what is not the work
+/// of lines. A line takes a few coefficients, which no noise makes so large; a single reading takes a little of each. A strong line
+/// would hide it behind its own swing.
+pub(crate) fn without_lines(
+    coefficients: &[f64],
+    density: &[f64],
+    white: f64,
+    dct: &Dct,
+) -> Vec<f64> {
+    let each = coefficients.iter().zip(density);
+    let mut c: Vec<f64> = each.map(|(c, g)| c / (white * g).sqrt()).collect();
+    let limit = spike_limit(c.len()) * robust_sigma(&c);
+    let rest = c.iter().filter(|v| v.abs() <= limit);
+    let (count, square) = rest.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v * v));
+    if count < c.len() as f64 && square > 0.0 {
+        let sigma = f64::sqrt(square / count);
+        let cleared = |v: &mut f64| *v = if v.abs() > limit { 0.0 } else { *v / sigma };
+        c.iter_mut().for_each(cleared);
+    }
+    dct.inverse(&c)
+}
+
 /// Take out single samples that the noise cannot have made, and fill their places; largest first, since each one
 /// widens the noise that the others are held against. What is loud for longer than `least` readings has no singles for that.
 pub(super) fn spikes(
@@ -58,13 +80,7 @@ pub(super) fn spikes(
     let n = y.len();
     let mut found: Vec<usize> = vec![];
     for _ in 0..PASSES {
-        let g = fit.0.everywhere(bins);
-        let c: Vec<f64> = coefficients
-            .iter()
-            .zip(&g)
-            .map(|(c, g)| c / (fit.1 * g).sqrt())
-            .collect();
-        let e = dct.inverse(&c);
+        let e = without_lines(coefficients, &fit.0.everywhere(bins), fit.1, dct);
         let loud = loudness(&e, given, least);
         let beyond = |limit: f64| {
             (0..n)

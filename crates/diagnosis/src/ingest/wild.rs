@@ -13,6 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use statrs::function::gamma::ln_gamma;
 
 use crate::fit::likelihood::{Noise, Panel};
+use crate::ingest::spikes::without_lines;
 use crate::ingest::types::Grid;
 use crate::ingest::{fill, kalman};
 use crate::test_level::OMNIBUS_LEVEL;
@@ -175,11 +176,7 @@ pub(crate) fn found(e: &[f64], known: &[f64], single: f64) -> Option<f64> {
 pub(crate) fn suspected(grid: &Grid, channel: usize) -> bool {
     let target = &grid.targets[channel];
     let g = target.noise.everywhere(&grid.bins);
-    let whitened = target.coefficients.iter().zip(&g);
-    let u: Vec<f64> = whitened
-        .map(|(c, g)| c / (target.white * g).sqrt())
-        .collect();
-    let e = grid.dct.inverse(&u);
+    let e = without_lines(&target.coefficients, &g, target.white, &grid.dct);
     let own = far(e.iter().copied());
     limit(&own, grid.n).is_some()
 }

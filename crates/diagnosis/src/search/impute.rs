@@ -6,26 +6,35 @@
 //! and everything is fitted again (the EM algorithm with a draw in the place of the expectation: what is off shrinks each
 //! time by the part of the information that was lost). The errors are those of the readings that there are.
 
-use crate::fit::channel::{Form, State, Term};
+use crate::fit::channel::{Form, State, Term, whitened};
 use crate::fit::likelihood::{Noise, Panel, invert};
 use crate::fit::scan::residual;
 use crate::ingest::conditional_draw;
 use crate::ingest::fill::{draws, many};
 use crate::ingest::types::Target;
 use crate::search::Search;
+use numerics::tails;
 
 /// Times that it is done: of a hole of a third, 1/81 is left.
 const PASSES: usize = 4;
+/// Chance below which the filled readings are none of the noise that a state has.
+const UNLIKE: f64 = 0.01;
 /// The state fitted to the data of the panel with its lost readings filled by what it explains itself; none where they are
-/// too few to matter.
+/// too few to matter: readings that a large line is missing in are tails of the noise, however few.
 pub(crate) fn again(search: &Search<'_>, state: &State, target: &Target) -> Option<State> {
     // What was found by other means than the fit is not fitted again.
     let stated = state.terms.iter().any(|t| t.stated.is_some());
-    if !many(&target.lost, search.panel.bins.n) || stated || target.moving {
+    if stated || target.moving || target.lost.is_empty() {
         return None;
     }
+    let passes = match many(&target.lost, search.panel.bins.n) {
+        true => PASSES,
+        // Of so few nothing is left.
+        false if are_unlike(search, state, &target.lost) => 1,
+        false => return None,
+    };
     let mut state = state.clone();
-    for _ in 0..PASSES {
+    for _ in 0..passes {
         let mut y = rest(search, &state);
         refill(search, &state, &coordinates(&state), &mut y, &target.lost);
         search.settle(&mut state);
@@ -43,6 +52,16 @@ pub(crate) fn again(search: &Search<'_>, state: &State, target: &Target) -> Opti
     widen(search, &mut state, &target.lost);
     state.wider = wider(search, &state, &target.lost);
     Some(state)
+}
+
+/// Whether the filled readings are farther off than the noise of a state.
+fn are_unlike(search: &Search<'_>, state: &State, lost: &[usize]) -> bool {
+    if state.terms.is_empty() {
+        return false;
+    }
+    let (_, e) = whitened(&search.panel, state);
+    let square = lost.iter().map(|i| e[*i] * e[*i]).sum();
+    tails::chi_tail(square, lost.len() as f64) < UNLIKE
 }
 
 /// What the columns leave, by sample.
