@@ -100,6 +100,9 @@ pub fn bounds(name: &str, unit: &str) -> [f64; 2] {
 const MOST_STAGES: f64 = 3.0;
 const MOST_AVERAGED: f64 = 64.0;
 
+/// Most counts from one reading to the next: as many as the highest bit makes.
+pub(crate) const MOST_COUNTS: f64 = (1u32 << HIGHEST_BIT as u32) as f64;
+
 /// Largest coefficient of the logarithm of a filter's gain: e^40 between what passes and what does not.
 const MOST_CEPSTRUM: f64 = 20.0;
 
@@ -109,6 +112,7 @@ pub(crate) fn of_parameter(name: &str, unit: &str, rate_hz: f64) -> Range {
         ("count" | "clipped", _) => range(0.0, MOST_SAMPLES),
         ("running" | "behind", _) => range(1.0, MOST_SAMPLES),
         ("bit" | "missing_bits", _) => whole(0.0, HIGHEST_BIT),
+        ("step_counts", _) => whole(1.0, MOST_COUNTS),
         ("value" | "by_magnitude" | "triangular" | "silent" | "normal", _) => whole(0.0, 1.0),
         ("stages", _) => whole(1.0, MOST_STAGES),
         ("averaged", _) => whole(1.0, MOST_AVERAGED),

@@ -43,8 +43,19 @@ pub(super) enum Role {
         unit: String,
         zero: f64,
         scale: f64,
-        counts: bool,
+        held: Held,
     },
+}
+
+/// What cells of a channel are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Held {
+    /// Values in some unit.
+    Values,
+    /// Counts of the part: whole numbers.
+    Counts,
+    /// As a scale multiplies them that somebody states: counts, where all are whole numbers.
+    Scaled,
 }
 
 /// What a file says of its columns.
@@ -255,6 +266,7 @@ pub(super) fn measured(
     unit: Option<&str>,
 ) -> Result<Column, CaptureError> {
     let by = convert(What::Channel(quantity), unit)?;
+    let held = by.held(quantity);
     Ok(Column {
         at,
         name: name.to_owned(),
@@ -263,7 +275,7 @@ pub(super) fn measured(
             unit: by.unit,
             zero: by.zero,
             scale: by.scale,
-            counts: false,
+            held,
         },
         is_asked: true,
     })
@@ -411,7 +423,7 @@ fn exported(at: usize, name: &str, unit: &str) -> Column {
             unit: unit.to_owned(),
             zero: 0.0,
             scale: 1.0,
-            counts: false,
+            held: Held::Values,
         },
         is_asked: false,
     }

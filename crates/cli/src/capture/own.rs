@@ -3,7 +3,7 @@
 use model::record::Quantity;
 
 use super::build::{CORRECTED, OF_CORRECTION};
-use super::columns::{Column, Columns, NONE_OF_OURS, Role, Said, is_inertial};
+use super::columns::{Column, Columns, Held, NONE_OF_OURS, Role, Said, is_inertial};
 use super::corrected::STATE;
 use super::error::brief;
 use super::foreign::meaning;
@@ -67,7 +67,7 @@ pub(super) fn own(
                     unit: unit.to_owned(),
                     zero: 0.0,
                     scale: 1.0,
-                    counts: false,
+                    held: Held::Values,
                 }
             }
             None => {
@@ -101,7 +101,7 @@ fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, 
         unit: unit.to_owned(),
         zero,
         scale,
-        counts: true,
+        held: Held::Counts,
     };
     Ok(Some(match (name, quantity) {
         ("seq", _) => Role::Seq,
@@ -132,14 +132,14 @@ fn role_of(name: &str, lines: &Lines, is_capture: bool) -> Result<Option<Role>, 
             unit: "1".to_owned(),
             zero: 0.0,
             scale: 1.0,
-            counts: false,
+            held: Held::Values,
         },
         (name, _) if is_capture && CORRECTED.contains(&name) => Role::Measured {
             quantity: Quantity::Derived,
             unit: "deg/s".to_owned(),
             zero: 0.0,
             scale: lines.scale("corrected_lsb_dps", name)?,
-            counts: false,
+            held: Held::Values,
         },
         (_, Quantity::Other | Quantity::Derived) => return Ok(None),
     }))

@@ -9,7 +9,7 @@ use std::path::Path;
 use model::record::{Base, Channel, Header, Quantity, Record, fills, sentinels};
 
 use super::angle::difference_angles;
-use super::columns::{Column, Columns, Role, Said, columns};
+use super::columns::{Column, Columns, Held, Role, Said, columns};
 use super::corrected::without_unapplied;
 use super::error::brief;
 use super::foreign::meaning;
@@ -31,7 +31,7 @@ use super::several::Sensors;
 use super::skipped::keep_places;
 use super::span::Span;
 use super::steady::{by_rounded_times, one_rate, unsteady};
-use super::steps::own_steps;
+use super::steps::{LARGEST_COUNT, own_steps};
 use super::stream::{TextLines, io, named, unpacked};
 use super::table::Table;
 #[cfg(feature = "native")]
@@ -159,6 +159,7 @@ fn read_named(
     };
     (found.ask()).map_err(|error| forms.mention(scales.mention(error)))?;
     found.notes.extend(of_phone);
+    scales.state(&mut header, &found);
     found.notes.extend(scales.notes);
     if let Some((first, last)) = layout.preamble {
         found.notes.push(format!(
@@ -435,6 +436,11 @@ fn whole(values: &[f64]) -> Vec<u64> {
     values.iter().map(|&value| value as u64).collect()
 }
 
+/// Whether a cell may be a count.
+fn is_count(v: &f64) -> bool {
+    v.is_nan() || (v.fract() == 0.0 && v.abs() < LARGEST_COUNT)
+}
+
 fn place(record: &mut Record, column: Column, values: Vec<f64>) {
     match column.role {
         Role::Seq => record.seq = Some(unwrap(&whole(&values), 1 << 16)),
@@ -446,9 +452,14 @@ fn place(record: &mut Record, column: Column, values: Vec<f64>) {
             unit,
             zero,
             scale,
-            counts,
+            held,
         } => {
             let (_, axis) = meaning(&column.name);
+            let counts = match held {
+                Held::Values => false,
+                Held::Counts => true,
+                Held::Scaled => values.iter().all(is_count),
+            };
             // Where a row has no value, its count means nothing.
             let whole = counts.then(|| {
                 values

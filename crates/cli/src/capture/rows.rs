@@ -2,11 +2,12 @@
 
 use super::CaptureError;
 use super::cells::{Cells, is_missing};
-use super::columns::{Column, Role};
+use super::columns::{Column, Held, Role};
 use super::error::brief;
 use super::infinite::{Infinite, is_infinite};
 use super::propose::date_of;
 use super::several::Sensors;
+use super::steps::LARGEST_COUNT;
 use super::time::{Clock, is_date, is_of_day};
 
 impl Role {
@@ -19,7 +20,9 @@ impl Role {
             Role::Seq | Role::Ticks => whole && v < 9e15,
             Role::Flags => whole && v <= 65_535.0,
             Role::Time { .. } => v.is_finite(),
-            Role::Measured { counts: true, .. } => v.is_nan() || (is_whole && v.abs() < 1e9),
+            Role::Measured {
+                held: Held::Counts, ..
+            } => v.is_nan() || (is_whole && v.abs() < LARGEST_COUNT),
             Role::Measured { .. } => !v.is_infinite(),
         }
     }

@@ -2,15 +2,16 @@
 
 use std::io::BufRead;
 
-use model::record::Quantity;
+use model::record::{Header, Quantity};
 
 use super::CaptureError;
 use super::cells::Cells;
+use super::columns::{Column, Columns, Held, Role};
 use super::error::brief;
 use super::layout::Layout;
 use super::propose::inertial;
 use super::stream::TextLines;
-use super::units::{COUNTS, What, is_angle, is_unit_of, known};
+use super::units::{COUNTS, What, convert, is_angle, is_unit_of, known};
 
 /// The size of a count, and where it stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,8 +30,12 @@ pub(super) struct Scales {
     pub notes: Vec<String>,
     /// Lines that say something of a scale and were not taken, for who is asked for a unit.
     pub untaken: Vec<String>,
+    /// What a count of gyros is, deg/s, that are in a unit of a rate.
+    of_rates: Option<f64>,
 }
 
+/// Key of a header that says what a count of the gyros is, deg/s.
+const GYRO_SCALE: &str = "gyro_lsb_dps";
 /// What counts are called.
 const COUNT: [&str; 6] = ["lsb", "counts", "count", "digits", "digit", "bit"];
 /// Words of a line that says something of a scale.
@@ -83,6 +88,12 @@ impl Scales {
             let is_open = |at: &usize| {
                 whole[*at] && (layout.units[*at].as_deref()).is_none_or(|unit| unit == COUNTS)
             };
+            let in_unit = |at: &usize| layout.units[*at].as_deref().is_some_and(|u| u != COUNTS);
+            if quantity == Quantity::Gyro && !places.is_empty() && places.iter().all(in_unit) {
+                found.of_rates = convert(What::Channel(quantity), Some(&first.unit))
+                    .ok()
+                    .map(|by| by.scale);
+            }
             if places.is_empty() || !places.iter().all(is_open) {
                 continue;
             }
@@ -103,6 +114,27 @@ impl Scales {
             .map(|(line, text)| format!("line {line} says `{}`", brief(text.trim())))
             .collect();
         Ok(found)
+    }
+
+    /// States in the header what a count is of gyros that were read in deg/s: their readings may be multiples of several.
+    pub fn state(&self, header: &mut Header, found: &Columns) {
+        let in_values = |c: &Column| match &c.role {
+            Role::Measured {
+                quantity: Quantity::Gyro,
+                held,
+                unit,
+                ..
+            } => *held == Held::Values && unit == "deg/s",
+            _ => true,
+        };
+        let has = header.entries.iter().any(|(key, _)| key == GYRO_SCALE);
+        if let Some(lsb) = self.of_rates.filter(|_| !has)
+            && found.columns.iter().all(in_values)
+        {
+            header
+                .entries
+                .push((GYRO_SCALE.to_owned(), lsb.to_string()));
+        }
     }
 
     /// An error that asks for a unit, with what the file says of it.

@@ -11,7 +11,7 @@ use model::record::{Channel, Quantity, Record};
 use super::STANDARD_GRAVITY;
 
 /// Counts of a file stay below: docs/capture.md.
-const LARGEST_COUNT: f64 = 1e9;
+pub(super) const LARGEST_COUNT: f64 = 1e9;
 /// The finest step is cut in as many at most, for all steps to be whole numbers of parts.
 const MOST_PARTS: u32 = 64;
 /// Where none are whole, a step that is nothing beside any noise, deg/s and m/s^2, and parts of the finest one at least: half a

@@ -2,6 +2,7 @@
 
 use model::record::{FULL_DUTY, Quantity};
 
+use super::columns::Held;
 use super::error::brief;
 use super::{CaptureError, STANDARD_GRAVITY};
 
@@ -154,6 +155,8 @@ pub(super) struct Conversion {
     pub unit: String,
     pub zero: f64,
     pub scale: f64,
+    /// Whether the unit is a number of others: what a count is.
+    pub is_multiple: bool,
 }
 
 impl Conversion {
@@ -162,6 +165,17 @@ impl Conversion {
             unit: unit.to_owned(),
             zero,
             scale,
+            is_multiple: false,
+        }
+    }
+
+    /// What the cells are. Counts of an angle are differenced, and none of what is read.
+    pub fn held(&self, quantity: Quantity) -> Held {
+        let of_rate = matches!(quantity, Quantity::Gyro | Quantity::Acc) && self.unit != ANGLE;
+        if self.is_multiple && of_rate {
+            Held::Scaled
+        } else {
+            Held::Values
         }
     }
 }
@@ -242,7 +256,10 @@ fn multiple(what: What, given: &str) -> Option<Conversion> {
         return None;
     }
     let one = scale(what, known(unit)?)?;
-    (one.zero == 0.0).then(|| Conversion::by(&one.unit, 0.0, one.scale * number))
+    (one.zero == 0.0).then(|| Conversion {
+        is_multiple: true,
+        ..Conversion::by(&one.unit, 0.0, one.scale * number)
+    })
 }
 
 /// The unit that is taken where none is said.

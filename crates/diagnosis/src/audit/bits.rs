@@ -1,13 +1,16 @@
 //! Low bits: missing ones, and one that sticks.
 //!
 //! Missing bits need no noise model. Where all counts are one residue apart by 2^k, every change is a multiple of 2^k;
-//! a change of a finer converter is even with a chance below 1/2, however small or large its noise.
+//! a change of a finer converter is even with a chance below 1/2, however small or large its noise. The same holds of
+//! multiples of any other number, where no reading but those at the ends lies beside them.
 //!
 //! A bit that sticks moves the share of ones. With the reading normal about what its neighbours predict, L, the square
 //! wave s of period P = 2^(b+1) (+1 where bit b is 0) has the mean
 //! E s = sum over odd m of 4/(pi m) exp(-2 pi^2 sigma^2 m^2 / P^2) sin(2 pi m (L + 1/2) / P),
 //! nearly 0 for the lowest bits and far from it where P exceeds 4 sigma. That shows that the counts are not what normal
 //! noise makes them; whether a bit sticks, and which, is decided by the likelihood of their histogram ([`super::stuck`]).
+
+mod coarse;
 
 use std::f64::consts::PI;
 
@@ -18,78 +21,17 @@ use super::cells::Cells;
 use super::stuck::{self, Stuck, Verdict};
 use super::{Audit, Gyro, LEAST_READINGS};
 use crate::audit::local::{Levels, Local};
-use crate::result::{Alternative, Finding};
-use crate::test_level::{CheckId, Observation, audit_level};
+use crate::result::Finding;
+use crate::test_level::{CheckId, Observation};
 use numerics::tails;
 use numerics::tails::ONE_SIDED;
 
 /// Most low bits that are looked at.
 const BITS: u32 = 8;
-/// Share of the readings that have to lie on the coarse grid; the rails may lie beside it.
-const ON_GRID: f64 = 0.97;
 /// A bit is tested while its weight is below this many sigma: beyond, the level decides it, not the noise.
 const WITHIN_SIGMA: f64 = 2.0;
 /// Least noise, counts: below it the level decides even the lowest bit.
 const LEAST_SIGMA: f64 = 0.9;
-/// Coarse grid that the counts lie on.
-struct Coarse {
-    bits: u32,
-    residue: i32,
-    changes: u64,
-    /// Whether all readings between the ends lie on it.
-    whole: bool,
-}
-
-fn coarse(counts: &[i32], known: &[bool]) -> Option<Coarse> {
-    let mut found = None;
-    let known_codes = || {
-        counts
-            .iter()
-            .zip(known)
-            .filter(|(_, k)| **k)
-            .map(|(c, _)| c)
-    };
-    let (low, high) = (*known_codes().min()?, *known_codes().max()?);
-    for bits in 1..=BITS {
-        let step = 1 << bits;
-        let mut tally = vec![0u64; step as usize];
-        let mut all = 0u64;
-        for (c, _) in counts.iter().zip(known).filter(|(_, k)| **k) {
-            tally[c.rem_euclid(step) as usize] += 1;
-            all += 1;
-        }
-        let (residue, most) = tally
-            .iter()
-            .enumerate()
-            .max_by_key(|(_, t)| **t)
-            .map(|(r, t)| (r as i32, *t))?;
-        if (most as f64) < ON_GRID * all as f64 {
-            break;
-        }
-        // Pairs that do not share a reading are independent.
-        let changes: Vec<bool> = counts
-            .chunks_exact(2)
-            .zip(known.chunks_exact(2))
-            .filter(|(c, k)| k[0] && k[1] && c[0] != c[1])
-            .map(|(c, _)| (c[1] - c[0]).rem_euclid(step) == 0)
-            .collect();
-        let even = changes.iter().filter(|e| **e).count() as u64;
-        let trials = changes.len() as u64;
-        if (even as f64) < ON_GRID * trials as f64
-            || tails::hits_at_least(even, trials, 0.5) > audit_level()
-        {
-            break;
-        }
-        found = Some(Coarse {
-            bits,
-            residue,
-            changes: trials,
-            whole: known_codes().all(|c| [low, high].contains(c) || c.rem_euclid(step) == residue),
-        });
-    }
-    found
-}
-
 /// Mean of a square wave (+1 in the first half of its period) of normal readings, rounded.
 pub(super) struct Square {
     /// 2 pi over the period.
@@ -189,9 +131,9 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let name = g.channel.name.as_str();
     audit.smallest(effects::coarse_lsb::ID, name, "missing_bits", 1.0, "1");
     let known: Vec<bool> = (0..counts.len()).map(|i| g.known(i)).collect();
-    let coarse = coarse(counts, &known);
+    let coarse = coarse::grid(counts, &known);
     if let Some(c) = coarse.as_ref().filter(|c| c.whole) {
-        tell_coarse(c, name, unrounded(&g.local), audit);
+        coarse::tell(c, g.channel, unrounded(&g.local), audit);
         return Shape::Other;
     }
     if known.iter().filter(|k| **k).count() < LEAST_READINGS {
@@ -212,7 +154,7 @@ pub(super) fn audit(g: &Gyro<'_>, audit: &mut Audit) -> Shape {
     let verdict = stuck::judge(&codes, sigma, lsb, BITS, worst.alarmed);
     // Single readings off a coarse grid are another fault's, unless two roundings make them.
     if let Some(c) = coarse.filter(|_| !matches!(verdict, Verdict::Twice { .. })) {
-        tell_coarse(&c, name, unrounded(&g.local), audit);
+        coarse::tell(&c, g.channel, unrounded(&g.local), audit);
         return Shape::Other;
     }
     match verdict {
@@ -323,55 +265,6 @@ fn unlike(name: &str, worst: &Worst, nats: f64, nearest: &str) -> String {
         worst.share.z.abs(),
         worst.share.bit
     )
-}
-
-/// States the coarse grid of a channel: what it is taken for, and that its noise lacks those bits.
-fn tell_coarse(c: &Coarse, name: &str, sigma: f64, audit: &mut Audit) {
-    let chance = 0.5f64.powi(c.changes.min(900) as i32);
-    let what = format!(
-        "the {} lowest bits of {name} never change: its step is {} counts ({} changes, all of whole steps)",
-        c.bits,
-        1 << c.bits,
-        c.changes
-    );
-    audit.check(
-        CheckId::LowBits,
-        name,
-        f64::from(c.bits),
-        chance,
-        what.clone(),
-    );
-    let mut finding = Finding {
-        cause: effects::coarse_lsb::ID.into(),
-        channels: vec![name.into()],
-        what,
-        ..Finding::default()
-    };
-    // One bit at 1 throughout is no grid that a converter makes.
-    if c.bits == 1 && c.residue == 1 {
-        finding.cause = effects::stuck_bit::ID.into();
-        finding.parameters = parameters(0, 1, 1.0, None);
-    } else {
-        finding.parameters.insert(
-            "missing_bits".into(),
-            Parameter::exact(f64::from(c.bits), "1"),
-        );
-        if c.bits == 1 {
-            finding.alternatives.push(Alternative {
-                cause: effects::stuck_bit::ID.into(),
-                log_odds: 0.0,
-            });
-            finding.experiment = Some("read a register with known odd contents over the same line: a stuck line shows there too".into());
-        }
-    }
-    audit.findings.push(finding);
-    let step = f64::from(1u32 << c.bits);
-    audit.lacks_a_bit(name, effects::coarse_lsb::ID, step, sigma);
-    audit.suppress(
-        &[effects::stuck_bit::ID, effects::stale_samples::ID],
-        name,
-        effects::coarse_lsb::ID,
-    );
 }
 
 /// The bit whose share of ones is farthest from the expected one.

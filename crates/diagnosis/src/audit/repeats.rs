@@ -228,14 +228,14 @@ impl<'a> Readings<'a> {
         };
         // With missing bits the step is theirs.
         let step = |g: &Gyro<'_>| {
-            let bits = audit
-                .findings
-                .iter()
+            let coarse = (audit.findings.iter())
                 .find(|f| f.cause == effects::coarse_lsb::ID && f.channels[0] == g.channel.name)
-                .and_then(|f| f.parameters.get("missing_bits"))
-                .map_or(0.0, |p| p.value);
+                .map_or(1, |f| effects::coarse_lsb::step(&f.parameters));
             let lsb = g.channel.lsb.filter(|_| g.counts.is_some());
-            lsb.map_or_else(|| smallest_step(&g.channel.values), |l| l * bits.exp2())
+            lsb.map_or_else(
+                || smallest_step(&g.channel.values),
+                |l| l * f64::from(coarse),
+            )
         };
         let gyros: Vec<&Gyro<'_>> = gyros.iter().filter(varies).collect();
         let columns: Vec<&[f64]> = gyros.iter().map(|g| g.channel.values.as_slice()).collect();

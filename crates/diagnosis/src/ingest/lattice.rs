@@ -1,5 +1,5 @@
 //! Counts of readings that come without them: a file in deg/s whose readings are multiples of a step holds what the
-//! converter delivered, times a scale.
+//! converter delivered, times a scale. Where the record says the scale, or another gyro has finer steps, a step may be several counts.
 
 use std::borrow::Cow;
 
@@ -22,6 +22,10 @@ const FAR: f64 = 0.22;
 const FINE: f64 = 256.0;
 /// How far two steps may be apart, in powers of two, to be told as one times a power of two.
 const SAME_STEP: f64 = 0.02;
+/// Key of the header that says what a count of the gyros is, deg/s.
+const SCALE: &str = "gyro_lsb_dps";
+/// Relative distance of a step from a whole number of the counts stated: 16.4 counts a deg/s, as data sheets write it, are 16.384.
+const STATED: f64 = 2e-3;
 /// Most bits that a converter may have lost beside its like.
 const MOST_BITS: f64 = 8.5;
 /// Largest count: converters of 20 bits are the finest of inertial sensors in use.
@@ -31,6 +35,7 @@ const LARGEST: f64 = 524_288.0;
 #[must_use]
 pub fn counted(record: &Record) -> Cow<'_, Record> {
     let mut whole = Cow::Borrowed(record);
+    let stated = stated(record);
     let without = |c: &Channel| c.quantity == Quantity::Gyro && c.counts.is_none();
     let all = record.channels.iter().enumerate();
     let found: Vec<(usize, f64, Vec<i32>)> = all
@@ -41,10 +46,13 @@ pub fn counted(record: &Record) -> Cow<'_, Record> {
         let unit = &record.channels[*i].unit;
         let alike = found.iter().filter(|f| record.channels[f.0].unit == *unit);
         let finest = alike.map(|f| f.1).fold(*step, f64::min);
-        let bits = bits_between(*step, finest);
+        let of_scale = stated.filter(|_| unit == "deg/s");
+        let coarse = of_scale
+            .and_then(|stated| of_stated(*step, stated))
+            .unwrap_or_else(|| beside(*step, finest));
         let own = &mut whole.to_mut().channels[*i];
-        own.lsb = Some(step / f64::from(1 << bits));
-        own.counts = Some(counts.iter().map(|c| c << bits).collect());
+        own.lsb = Some(step / f64::from(coarse));
+        own.counts = Some(counts.iter().map(|c| c * coarse).collect());
         // What few digits took off the multiples is no noise of the sensor, and hangs on the code.
         let multiples: Vec<f64> = counts.iter().map(|c| f64::from(*c) * step).collect();
         let off = |(v, m): (&f64, &f64)| (v - m).abs() > NEAR * step;
@@ -58,12 +66,27 @@ pub fn counted(record: &Record) -> Cow<'_, Record> {
     whole
 }
 
-/// Bits by which a step is coarser than that of another gyro of the sensor, whose converters are alike; 0 where it is no such
-/// multiple of it, or one that no counts reach.
-fn bits_between(step: f64, finest: f64) -> u32 {
+/// Counts in a step that is coarser than that of another gyro of the sensor, whose converters are alike: a power of two; 1 where
+/// it is no such multiple of it, or one that no counts reach.
+fn beside(step: f64, finest: f64) -> i32 {
     let bits = (step / finest).log2();
     let is_one = (bits - bits.round()).abs() < SAME_STEP && bits < MOST_BITS;
-    if is_one { bits.round() as u32 } else { 0 }
+    if is_one { 1 << bits.round() as u32 } else { 1 }
+}
+
+/// Counts in a step, where it is a whole number of those that the record states.
+fn of_stated(step: f64, stated: f64) -> Option<i32> {
+    let counts = (step / stated).round();
+    // As exact as a step of one count is told from one of its neighbours: a scale is stated to three digits or more.
+    let is_one = (step / stated - counts).abs() < STATED * counts.max(1.0);
+    (is_one && (1.0..MOST_BITS.exp2()).contains(&counts)).then_some(counts as i32)
+}
+
+/// What a count of the gyros is, in deg/s, as the record says.
+fn stated(record: &Record) -> Option<f64> {
+    let mut entries = record.header.entries.iter().rev();
+    let (_, lsb) = entries.find(|(key, _)| key == SCALE)?;
+    lsb.parse().ok().filter(|lsb: &f64| *lsb > 0.0)
 }
 
 /// The step of readings, and the multiple that each is, 0 where there is no reading. None where they are no multiples of
@@ -251,6 +274,40 @@ mod tests {
         }
         let counts = counted.channels[1].counts.as_ref().unwrap();
         assert!(counts.iter().all(|c| c % 4 == 0));
+    }
+
+    #[test]
+    fn a_step_of_several_stated_counts_has_them() {
+        for (lsb, coarse, said, wanted) in [
+            (1.0 / 131.0, 3, Some("0.0076336"), 3),
+            (1.0 / 16.384, 4, Some("0.060976"), 4),
+            (1.0 / 131.0, 1, Some("0.0076336"), 1),
+            // 1.5 counts, and counts that nobody states.
+            (1.5 / 131.0, 1, Some("0.0076336"), 1),
+            (1.0 / 131.0, 3, None, 1),
+        ] {
+            let of = codes(6.0, 0.0).into_iter().map(|c| c * coarse);
+            let values = of.map(|c| f64::from(c) * lsb).collect();
+            let gyro = Channel {
+                name: "gyro".into(),
+                quantity: Quantity::Gyro,
+                axis: None,
+                unit: "deg/s".into(),
+                lsb: None,
+                counts: None,
+                values,
+            };
+            let mut record = Record {
+                channels: vec![gyro],
+                ..Record::default()
+            };
+            let entries = &mut record.header.entries;
+            entries.extend(said.map(|said| (SCALE.to_owned(), said.to_owned())));
+            let counted = counted(&record);
+            let counts = counted.channels[0].counts.as_ref().unwrap();
+            assert!(counts.iter().all(|c| c % wanted == 0), "{said:?}");
+            assert!(wanted != 1 || counts.iter().any(|c| c % 2 != 0), "{said:?}");
+        }
     }
 
     #[test]

@@ -192,9 +192,9 @@ fn coded(f: &Finding, of: &[&Searched<'_>]) -> Option<(Vec<Option<bool>>, f64)> 
         }
         effects::coarse_lsb::ID => {
             let codes = codes()?;
-            let step = value("missing_bits")?.exp2() as i64;
-            let rest = codes.of.iter().flatten().next()?.rem_euclid(step.max(1));
-            let on = move |c: i64| c.rem_euclid(step.max(1)) == rest;
+            let step = i64::from(effects::coarse_lsb::step(&f.parameters));
+            let rest = codes.of.iter().flatten().next()?.rem_euclid(step);
+            let on = move |c: i64| c.rem_euclid(step) == rest;
             Some((codes.events(&on), codes.chance(&on)))
         }
         effects::stuck_bit::ID => {

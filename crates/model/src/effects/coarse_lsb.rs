@@ -1,9 +1,10 @@
 //! Low bits are missing.
 
 use crate::effect::{
-    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View,
-    parameter, value,
+    Docs, Effect, Example, Hypothesis, ParameterSpec, Parameters, Plot, Rival, Stage, View, detail,
+    optional, parameter, value,
 };
+use crate::range;
 use crate::simulate::Simulation;
 
 /// The effect.
@@ -21,17 +22,24 @@ impl Effect for CoarseLsb {
     }
 
     fn parameters(&self) -> &'static [ParameterSpec] {
-        const PARAMETERS: &[ParameterSpec] =
-            &[parameter("missing_bits", "1", "low bits that are always 0")];
+        const PARAMETERS: &[ParameterSpec] = &[
+            parameter("missing_bits", "1", "low bits that are always 0"),
+            optional(
+                "step_counts",
+                "1",
+                "counts from one reading to the next: 2^missing_bits where it is not given",
+            ),
+            detail("step_size", "deg/s", "the same in the unit of the readings"),
+        ];
         PARAMETERS
     }
 
     fn docs(&self) -> Docs {
         Docs {
             title: "Coarse quantisation",
-            physics: "The lowest bits are always zero: a wrong shift, a format with fewer bits.",
+            physics: "The lowest bits are always zero, or all counts are multiples of a few: a wrong shift, a format with fewer bits, a scale that the part does not fill.",
             excitation: "Nothing.",
-            test: "Audit: share of ones in the low bits against the share that the noise makes.",
+            test: "Audit: whether all changes are multiples of some counts. It needs to know what a count is: the part's own counts, a scale that the file or `--units` states, or a gyro of the same record and unit with a step 2^k times finer.",
             remedy: "Correct the shift or the data format in the reading code; if the part has no more bits, give the simulation the larger step.",
             figure: "Share of ones by bit.",
             example: Example::new(Plot::Bits, &[("missing_bits", 2.0)]),
@@ -51,7 +59,7 @@ impl Effect for CoarseLsb {
     }
 
     fn coarsens(&self, parameters: &Parameters) -> f64 {
-        f64::from(1u32 << missing(parameters))
+        f64::from(step(parameters))
     }
 
     fn stage(&self) -> Stage {
@@ -59,15 +67,19 @@ impl Effect for CoarseLsb {
     }
 
     fn simulate(&self, parameters: &Parameters, channels: &[usize], simulation: &mut Simulation) {
-        let bits = missing(parameters);
+        let step = step(parameters);
         for &axis in channels {
             for c in &mut simulation.counts[axis] {
-                *c = (*c >> bits) << bits;
+                *c = c.div_euclid(step) * step;
             }
         }
     }
 }
 
-fn missing(parameters: &Parameters) -> u32 {
-    value(parameters, "missing_bits").round().clamp(0.0, 13.0) as u32
+/// Counts from one reading to the next.
+#[must_use]
+pub fn step(parameters: &Parameters) -> i32 {
+    let given = value(parameters, "step_counts").round();
+    let of_bits = value(parameters, "missing_bits").round().exp2();
+    (if given >= 1.0 { given } else { of_bits }).clamp(1.0, range::MOST_COUNTS) as i32
 }
