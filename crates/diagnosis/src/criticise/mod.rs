@@ -11,4 +11,5 @@ pub mod residual;
 pub mod scale;
 pub(crate) mod shock;
 pub mod short_time;
+pub(crate) mod step_time;
 pub mod variance_law;

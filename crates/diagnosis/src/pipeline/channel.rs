@@ -5,7 +5,9 @@ use std::sync::Arc;
 use model::effect::View;
 
 use crate::criticise::variance_law::Untold;
-use crate::criticise::{follower_shape, process, random_walk, residual, short_time, variance_law};
+use crate::criticise::{
+    follower_shape, process, random_walk, residual, short_time, step_time, variance_law,
+};
 use crate::fit::channel::{State, VarianceLaws, whitened};
 use crate::fit::estimate;
 use crate::fit::likelihood::{Noise, Panel};
@@ -179,6 +181,7 @@ fn searched_from<'a>(
     }
     estimate_under_law(&mut s, grid);
     estimate_over_time(&mut s, grid);
+    step_time::settle(&mut s);
     s.checks = channel_checks(&s, before);
     s
 }
