@@ -2,8 +2,8 @@
 //! it is.
 
 use diagnosis::result::{Alternative, Diagnosis, Finding, Parameter};
-use imu_stand::stand::planted::{Named, Planted, compare, planted};
-use imu_stand::stand::{Hidden, Plan, Sizes, plan};
+use imu_stand::stand::planted::{GYROS, Named, ON_ITS_WAY_S, Planted, compare, planted};
+use imu_stand::stand::{Hidden, Plan, Sizes, plan, run_native};
 
 const SECONDS: f64 = 600.0;
 /// When the record begins after power-on, s.
@@ -188,4 +188,39 @@ fn another_axis_is_no_match_and_nothing_planted_and_nothing_found_is_one() {
         alarm.lines(),
         ["planted nothing, found temperature on gyro_z: no match"]
     );
+}
+
+/// What is said of when a bias steps is when the readings do, by the time that a record counts from its first sample.
+#[test]
+fn a_step_is_planted_where_the_readings_show_it() {
+    for seed in 1..=8 {
+        let mut plan = plan(Hidden::Knock, Sizes::Visible, 60.0, seed);
+        let mut gyro = 0;
+        for fault in &mut plan.run.scenario.faults {
+            if let bench::Fault::Knock {
+                step_dps,
+                tilt_deg,
+                gyro: own,
+                ..
+            } = fault
+            {
+                (*step_dps, *tilt_deg, gyro) = (60.0, 0.0, *own);
+            }
+        }
+        let (record, _) = run_native(&plan, |_| {});
+        let first = record.host_time_s.as_ref().expect("times")[0];
+        let said = &planted(&plan.run, first - ON_ITS_WAY_S)[0];
+        let time = said.sizes.iter().find(|size| size.parameter == "time");
+        let time = time.expect("a time").value;
+        let values = &record.channel(GYROS[gyro]).expect("a gyro").values;
+        let behind = values.iter().position(|v| *v > 30.0).expect("a step");
+        // Half of the step is read between two samples of 20 Hz.
+        let (from, to) = (0.05 * (behind as f64 - 1.0), 0.05 * behind as f64);
+        // The part takes 256 samples a second.
+        let within = 1.0 / 256.0;
+        assert!(
+            (from - within..to + within).contains(&time),
+            "seed {seed}: {time} is not between {from} and {to}"
+        );
+    }
 }

@@ -19,7 +19,7 @@ use diagnosis::result::Diagnosis;
 use imu_stand::capture::{ReadOptions, read_capture};
 use imu_stand::report::Subject;
 use imu_stand::stand::planted::{
-    ACCELEROMETERS, Comparison, GYROS, Planted, RULE, compare, planted,
+    ACCELEROMETERS, Comparison, GYROS, ON_ITS_WAY_S, Planted, RULE, compare, planted,
 };
 use imu_stand::stand::{Board, Hidden, Plan, Seeds, Sizes, plan, plan_fitted, run_native};
 use imu_stand::text;
@@ -281,7 +281,8 @@ fn answered(arguments: &Arguments, plan: &Plan, record: &Record) -> Result<Answe
         matters: arguments.replicates.matters(),
     };
     let times = record.host_time_s.as_ref();
-    let start_s = times.and_then(|times| times.first()).map_or(0.0, |t| *t);
+    let first_s = times.and_then(|times| times.first());
+    let start_s = first_s.map_or(0.0, |t| t - ON_ITS_WAY_S);
     let hidden = planted(&plan.run, start_s);
     let say = || format!("diagnosing {}", options.file);
     let found = working(arguments.quiet, say, || {

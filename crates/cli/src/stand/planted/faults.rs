@@ -217,7 +217,7 @@ fn knocked(fault: &Fault, start_s: f64) -> Option<Planted> {
             ),
             vec![
                 Size::new("height", step_dps, "deg/s"),
-                Size::at("time", time_s - start_s),
+                Size::read_at("time", time_s - start_s),
             ],
         ),
         Fault::Bump {
@@ -238,7 +238,7 @@ fn knocked(fault: &Fault, start_s: f64) -> Option<Planted> {
                 number(3.0 * decay_s, 2)
             ),
             // How large a reading of it is hangs on the instant of the reading.
-            vec![Size::at("time", time_s - start_s)],
+            vec![Size::read_at("time", time_s - start_s)],
         ),
         _ => return None,
     };

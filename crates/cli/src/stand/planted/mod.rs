@@ -24,6 +24,11 @@ const SCALE_PLANTED: f64 = 0.02;
 /// Half of the interval between two samples, s: nearer no time in a record can be told.
 const HALF_A_SAMPLE_S: f64 = 0.5 / RATE_HZ;
 
+/// From a sample to the time that the host gives it, s: the board has put it into a frame after 1 ms (`bench::Timeline`), and the
+/// host has it with its last bit.
+pub const ON_ITS_WAY_S: f64 =
+    1e-3 + (10 * wire::Sample::FRAME_LEN) as f64 / crate::link::DEFAULT_BAUD as f64;
+
 /// Something planted in the stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planted {
@@ -72,9 +77,14 @@ impl Size {
     fn at(parameter: &'static str, time_s: f64) -> Self {
         Size::new(parameter, time_s, "s").within(HALF_A_SAMPLE_S)
     }
+
+    /// Of what goes through a gyro's filters: when the readings show it.
+    fn read_at(parameter: &'static str, time_s: f64) -> Self {
+        Size::at(parameter, time_s + sampled::LATE_S)
+    }
 }
 
-/// Everything planted in a run, whose record begins `start_s` after power came on.
+/// Everything planted in a run, the first sample of whose record was taken `start_s` after power came on.
 #[must_use]
 pub fn planted(run: &Run, start_s: f64) -> Vec<Planted> {
     let scenario = &run.scenario;

@@ -14,6 +14,10 @@ const FILTER: u32 = 2;
 /// Its analog pole, Hz, and the unit of its readings, deg/s, after power-on (ADIS16250 data sheet).
 const STATED_POLE_HZ: f64 = 50.0;
 const LSB_DPS: f64 = 0.073_26;
+/// How much later than the bias a reading steps, s: the pole, half of the filter's taps, and half a period of the part's clock until
+/// the board reads.
+pub(super) const LATE_S: f64 =
+    1.0 / (TAU * STATED_POLE_HZ) + ((1 << FILTER) - 1) as f64 / CLOCK_HZ + 0.5 / CLOCK_HZ;
 /// Time in which the noise on the shared reference decays, s (`bench::Fault::CommonNoise`).
 const COMMON_TAU_S: f64 = 15e-3;
 /// Clock periods after which nothing is left of a pulse through a pole of 50 Hz: e^-30.
