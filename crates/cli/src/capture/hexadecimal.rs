@@ -2,6 +2,7 @@
 //! the way.
 
 use std::cell::RefCell;
+use std::cmp::Ordering;
 use std::io::{BufRead, Cursor, Read, Result};
 use std::rc::Rc;
 
@@ -120,13 +121,46 @@ impl Column<'_> {
         self.0.len() > SHOWN && 10 * rises > 9 * (self.0.len() - 1) && steps().any(|step| step > 0)
     }
 
-    fn reading(&self) -> Reading {
+    /// How it is read; the others of the file say whether it has a sign where it does not by itself.
+    fn reading(&self, others: Option<bool>) -> Reading {
+        match self.own_reading() {
+            (reading, true) => reading,
+            (Reading::Signed(width), false) => {
+                let turn = 1i64 << (4 * width);
+                // Nearer to the middle of what its digits hold than to either end.
+                let is_middle = |hex: &Hex<'_>| (hex.value() - turn / 2).abs() < turn / 4;
+                let has_sign = others.unwrap_or(!self.0.iter().all(is_middle));
+                if has_sign {
+                    Reading::Signed(width)
+                } else {
+                    Reading::Unsigned
+                }
+            }
+            (reading, false) => reading,
+        }
+    }
+
+    /// Whether it has a sign, where it tells by itself: it goes on through zero, or through the middle of what its digits hold.
+    fn has_sign(&self) -> Option<bool> {
+        let (reading, _) = self.own_reading();
+        let halves = self
+            .0
+            .iter()
+            .map(|hex| (2 * hex.value()) >> (4 * hex.digits.len()));
+        let mut halves = halves.map(|half| half > 0);
+        let first = halves.next();
+        let is_in_both = halves.any(|half| Some(half) != first);
+        (is_in_both && !self.rises()).then_some(matches!(reading, Reading::Signed(_)))
+    }
+
+    /// How it is read by itself, and whether it tells: what lies in the upper half throughout may be either.
+    fn own_reading(&self) -> (Reading, bool) {
         if self.rises() {
-            return Reading::Unsigned;
+            return (Reading::Unsigned, true);
         }
         let most = self.0.iter().map(|hex| hex.digits.len()).max();
         let width = match (self.width(), most.unwrap_or(0)) {
-            (Some(..=OF_BYTE), _) => return Reading::Unsigned,
+            (Some(..=OF_BYTE), _) => return (Reading::Unsigned, true),
             (Some(width), _) => width,
             // `Serial.print(x, HEX)` writes 69 and FFFFFF6F, `%x` of an unsigned 69 and ff6f.
             (None, ..=OF_WORD) => OF_WORD,
@@ -138,9 +172,12 @@ impl Column<'_> {
             let all = || self.0.iter().filter_map(|hex| value(*hex, reading));
             all().max().unwrap_or(0) - all().min().unwrap_or(0)
         };
-        match span(Reading::Unsigned) < span(signed) {
-            true => Reading::Unsigned,
-            false => signed,
+        let is_upper = |hex: &Hex<'_>| value(*hex, signed).is_some_and(|v| v < 0);
+        let all_upper = self.0.iter().all(is_upper);
+        match span(Reading::Unsigned).cmp(&span(signed)) {
+            Ordering::Less => (Reading::Unsigned, true),
+            Ordering::Equal => (signed, !all_upper),
+            Ordering::Greater => (signed, true),
         }
     }
 }
@@ -330,9 +367,18 @@ fn of_head(text: &str, is_whole: bool) -> Option<(char, Vec<Reading>, Hexadecima
             || has_zero() && others().any(|other| columns[other].as_ref().is_some_and(is_word))
             || !has_names && !column.rises()
     };
+    // What goes on through zero or through the middle tells it of all: one part writes one kind of number.
+    let told = (0..width).filter(|at| is_hexadecimal(*at));
+    let told: Vec<bool> = told
+        .filter_map(|at| columns[at].as_ref()?.has_sign())
+        .collect();
+    let told = told
+        .first()
+        .copied()
+        .filter(|first| told.iter().all(|other| other == first));
     let readings: Vec<Reading> = (0..width)
         .map(|at| match &columns[at] {
-            Some(column) if is_hexadecimal(at) => column.reading(),
+            Some(column) if is_hexadecimal(at) => column.reading(told),
             _ => Reading::Decimal,
         })
         .collect();

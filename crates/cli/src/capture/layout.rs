@@ -89,7 +89,7 @@ impl Layout {
                 _ => ((1..=width).map(|k| format!("column_{k}")).collect(), true),
             };
             let mut layout = Self::new(lines, names, numbered, cells, Some((number, line)));
-            layout.said = comments;
+            (layout.preamble, layout.said) = (preamble, comments);
             return Ok(layout);
         }
         let first = next_row(text)?;
@@ -192,7 +192,16 @@ fn behind_preamble(
 ) -> Result<(u64, String), CaptureError> {
     let begins = |names: &str, row: &str| {
         let (of_names, of_rows) = separators(names, row, said);
-        let (names_cut, row_cut) = (Cells::new(of_names), Cells::new(of_rows));
+        let (mut names_cut, row_cut) = (Cells::new(of_names), Cells::new(of_rows));
+        // Words with a number among them that are as many by chance.
+        let of_row = |s: &&char| row.contains(**s) && !names.contains(**s);
+        if let (' ', Some(other)) = (of_names, SEPARATORS[..3].iter().find(of_row)) {
+            let words = owned(&names_cut.cut(names));
+            let is_number = |word: &String| Cells::new(' ').number(word).is_some();
+            if words.iter().any(is_number) {
+                names_cut = Cells::new(*other);
+            }
+        }
         let width = row_cut.cut(row).len();
         width > 1
             && are_as_wide(&names_cut.cut(names), &row_cut.cut(row))
@@ -223,13 +232,31 @@ fn behind_preamble(
     let at = if Cells::new(said.or(separator).unwrap_or(',')).is_row(line(0)) {
         0
     } else {
-        (0..seen.len()).find(is_table).unwrap_or(0)
+        let of_rows = || behind_remark(&seen, said);
+        (0..seen.len()).find(is_table).or_else(of_rows).unwrap_or(0)
     };
     let mut rest = seen.split_off(at).into_iter();
     comments.append(&mut seen);
     let names = rest.next();
     text.put_back(rest);
     names.ok_or(CaptureError::Empty)
+}
+
+/// Rows that a table without names has at least behind a remark.
+const ROWS: usize = 3;
+
+/// The first row of a table without names behind remarks: lines that nothing cuts as it cuts the rows, of which all have one width.
+fn behind_remark(seen: &[(u64, String)], said: Option<char>) -> Option<usize> {
+    let (_, last) = seen.last()?;
+    let found = || SEPARATORS.into_iter().find(|s| last.contains(*s));
+    let separator = said.or_else(found).filter(|s| *s != ' ')?;
+    let cells = Cells::new(separator);
+    let width = cells.cut(last).len();
+    let is_row = |line: &str| cells.cut(line).len() == width && cells.is_row(line);
+    let rows = seen.iter().rev().take_while(|(_, line)| is_row(line));
+    let at = seen.len() - rows.count();
+    let is_remark = |(_, line): &(u64, String)| !line.contains(separator);
+    (seen.len() - at >= ROWS && seen[..at].iter().all(is_remark)).then_some(at)
 }
 
 /// What separates names, and what separates the cells of rows: the first pair by which both have one width.

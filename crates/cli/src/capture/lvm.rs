@@ -100,6 +100,8 @@ pub(super) struct Lvm {
     units: Vec<(String, String)>,
     /// Units of channels that are none of a rate, an acceleration or a temperature.
     others: Vec<String>,
+    /// Channels that nobody has named, and what their units say they are.
+    named: Vec<(String, String)>,
     /// Whether nothing says when a row was sampled.
     is_untimed: bool,
     /// Whether each channel has times of its own.
@@ -122,6 +124,14 @@ impl Lvm {
         let mut notes = vec![format!(
             "the file is a measurement of LabVIEW (LVM){of}{times}"
         )];
+        if !self.named.is_empty() {
+            let named = self.named.iter();
+            let named = named.map(|(old, new)| format!("`{}` as `{new}`", brief(old)));
+            notes.push(format!(
+                "channels have no names of their own and are taken by their units, in their order: {}; `--columns` says otherwise",
+                named.collect::<Vec<_>>().join(", ")
+            ));
+        }
         if let Some((line, text)) = &self.comment {
             notes.push(format!(
                 "comments in rows: {}, which are not read, first in line {line}: `{}`",
@@ -324,7 +334,10 @@ impl Table {
         } else {
             Vec::new()
         };
-        for (name, unit) in channels.iter().zip(units) {
+        let shown = by_units(&channels, &units);
+        let named = channels.iter().zip(&shown).filter(|(old, new)| old != new);
+        found.named = named.map(|(old, new)| (old.clone(), new.clone())).collect();
+        for (name, unit) in shown.iter().zip(units) {
             let is_of =
                 |of: Quantity| known(unit).is_some_and(|unit| is_unit_of(unit, What::Channel(of)));
             let is_taken = [Quantity::Gyro, Quantity::Acc, Quantity::Temp]
@@ -341,7 +354,7 @@ impl Table {
         self.taken = (0..names.len())
             .filter(|at| is_channel(&names[*at]))
             .collect();
-        let mut all = channels.clone();
+        let mut all = shown;
         if !found.is_untimed {
             all.insert(
                 0,
@@ -416,4 +429,29 @@ impl Table {
         row.extend(self.taken.iter().map_while(|at| cells.get(*at)));
         made.push_str(&row.join(&self.separator.to_string()));
     }
+}
+
+/// What channels are called: where all have the name that LabVIEW gives, the sensor whose unit each has, along x, y and z.
+fn by_units(channels: &[String], units: &[&str]) -> Vec<String> {
+    let is_default = |name: &String| {
+        let number = name.strip_prefix("Untitled").map(str::trim);
+        number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let mut shown = channels.to_vec();
+    if units.len() != channels.len() || !channels.iter().all(is_default) {
+        return shown;
+    }
+    for (of, stem) in [(Quantity::Gyro, "gyro"), (Quantity::Acc, "acc")] {
+        let is_of = |at: &usize| {
+            known(units[*at])
+                .is_some_and(|unit| is_unit_of(unit, What::Channel(of)) && !is_angle(unit))
+        };
+        let places: Vec<usize> = (0..channels.len()).filter(is_of).collect();
+        if places.len() <= 3 {
+            for (at, axis) in places.into_iter().zip(["x", "y", "z"]) {
+                shown[at] = format!("{stem}_{axis}");
+            }
+        }
+    }
+    shown
 }

@@ -8,9 +8,9 @@ use super::columns::{Column, Columns, Role, Said, measured, time};
 use super::conventions::unit_of;
 use super::error::{brief, brief_list};
 use super::foreign::meaning;
-use super::names::TIMES;
+use super::names::{TIMES, respelt};
 use super::propose::seen::Seen;
-use super::propose::{alias, guess, nearest, times, unknown};
+use super::propose::{alias, guess, inertial, nearest, times, unknown};
 use super::units::{COUNTS, What, in_brackets, is_angle, known};
 use super::{CaptureError, ColumnMapping};
 
@@ -204,13 +204,7 @@ pub(super) fn beside_known(said: &Said<'_>, mapping: &ColumnMapping) -> Option<C
 /// The mapping of a file whose names say of each column what it is and in which unit, and leave no choice; nothing where
 /// anything would have to be guessed.
 pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option<ColumnMapping> {
-    let is_ours = |name: &String| {
-        matches!(
-            meaning(in_brackets(name).0).0,
-            Quantity::Gyro | Quantity::Acc
-        )
-    };
-    if said.numbered || said.names.iter().any(is_ours) {
+    if said.numbered || has_our_names(said) {
         return None;
     }
     let guess = guess(said.names, false, &Seen::default());
@@ -253,12 +247,45 @@ pub(super) fn by_known_names(said: &Said<'_>, mapping: &ColumnMapping) -> Option
             units.push((ours.clone(), own.to_owned()));
         }
     }
-    let columns = guess.columns.iter();
+    let others = beside_sensors(said, &guess.columns);
+    let columns = guess.columns.iter().chain(&others);
     let columns = columns.map(|(ours, at)| (ours.clone(), (at + 1).to_string()));
     (has_gyro && !guess.is_ambiguous).then(|| ColumnMapping {
         columns: columns.collect(),
         units,
     })
+}
+
+/// Whether gyros or accelerometers have names of ours. Accelerometers alone do not say what gyros of other names are.
+fn has_our_names(said: &Said<'_>) -> bool {
+    let stems: Vec<String> = (said.names.iter())
+        .map(|name| in_brackets(name).0.to_owned())
+        .collect();
+    let (names, _) = respelt(&stems, &TIMES, false);
+    let has = |quantity: Quantity| names.iter().any(|name| meaning(name).0 == quantity);
+    let has_foreign = || inertial(said.names).contains(&Some(Quantity::Gyro));
+    has(Quantity::Gyro) || has(Quantity::Acc) && !has_foreign()
+}
+
+/// What stands beside sensors by a name of ours, the first of each: a supply whose unit the file says, and the motor's command.
+fn beside_sensors(said: &Said<'_>, taken: &[(String, usize)]) -> Vec<(String, usize)> {
+    let mut found: Vec<(String, usize)> = Vec::new();
+    for (at, name) in said.names.iter().enumerate() {
+        let stem = in_brackets(name).0;
+        let ours = alias(stem).unwrap_or_else(|| stem.to_owned());
+        let what = What::Channel(meaning(&ours).0);
+        let has_unit = said.units[at].is_some() || unit_of(name, what, said.names).is_some();
+        let is_one = match meaning(&ours).0 {
+            Quantity::Supply => has_unit,
+            Quantity::Pwm => true,
+            _ => false,
+        };
+        let mut both = taken.iter().chain(&found);
+        if is_one && both.all(|(other, place)| *other != ours && *place != at) {
+            found.push((ours, at));
+        }
+    }
+    found
 }
 
 /// The place of a column by its name, by its name without a unit, or by its number from 1 on.
