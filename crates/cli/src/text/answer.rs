@@ -251,6 +251,13 @@ pub fn remedy(finding: &Finding, base: Option<Base>) -> Option<String> {
         Some(_) => remedy.strip_suffix(ASKED_OF_BASE).unwrap_or(remedy),
         None => remedy,
     };
+    // What is taken off is in the unit of what is read.
+    let is_acc = |name: &String| name.starts_with("acc_");
+    let of_accelerometers = !finding.channels.is_empty() && finding.channels.iter().all(is_acc);
+    let remedy = match of_accelerometers {
+        true => remedy.replace("from the rate", "from the acceleration"),
+        false => remedy.to_owned(),
+    };
     (!remedy.is_empty()).then(|| format!("What to do: {remedy}"))
 }
 

@@ -23,9 +23,21 @@ impl Effect for CrossAxis {
 
     fn parameters(&self) -> &'static [ParameterSpec] {
         const PARAMETERS: &[ParameterSpec] = &[
-            optional("from_gyro_x", "1", "share of the rate about x"),
-            optional("from_gyro_y", "1", "share of the rate about y"),
-            optional("from_gyro_z", "1", "share of the rate about z"),
+            optional(
+                "from_gyro_x",
+                "1",
+                "share of what gyro x reads of the motion",
+            ),
+            optional(
+                "from_gyro_y",
+                "1",
+                "share of what gyro y reads of the motion",
+            ),
+            optional(
+                "from_gyro_z",
+                "1",
+                "share of what gyro z reads of the motion",
+            ),
         ];
         PARAMETERS
     }
@@ -33,7 +45,7 @@ impl Effect for CrossAxis {
     fn docs(&self) -> Docs {
         Docs {
             title: "Cross-axis sensitivity",
-            physics: "b(t) = sum of shares x rates about the other axes: misaligned mounting, coupled modes of the element.",
+            physics: "b(t) = sum of shares x rates about the other axes, as their gyros read them: misaligned mounting, coupled modes of the element. Where such a gyro has a scale error too, its reading is (1 + relative) x the true rate, and the share of the true rate is (1 + relative) x the one told here.",
             excitation: "Rotation about another axis, while this one is at rest.",
             test: "Least squares on the other gyros that turn, random walk refitted.",
             remedy: "Calibrate the alignment on a rate table and multiply the three rates by the inverse of the measured matrix.",
@@ -95,7 +107,8 @@ impl Effect for CrossAxis {
             .iter()
             .enumerate()
         {
-            let share = value(parameters, name);
+            // It is told by what the other gyro reads.
+            let share = value(parameters, name) * simulation.scale[source];
             for &axis in channels {
                 for (rate, w) in simulation.rate[axis]
                     .iter_mut()

@@ -262,3 +262,22 @@ fn the_largest_lines_of_an_entry_are_listed_with_intervals_and_the_others_counte
     assert_eq!(lines(&left(1)).as_deref(), Some(one));
     assert!(lines(&left(6)).is_some_and(|text| text.ends_with(" at 34.0000 Hz, and 2 smaller.")));
 }
+
+#[test]
+fn what_is_taken_off_an_accelerometer_is_no_rate() {
+    for cause in [
+        "temperature",
+        "temperature_quadratic",
+        "supply_sensitivity",
+        "g_sensitivity",
+    ] {
+        let mut f = finding(cause, &[("slope", 3e-3, None, "m/s^2/degC")]);
+        assert!(remedy(&f, None).expect(cause).contains("from the rate"));
+        f.channels = vec!["acc_x".to_owned(), "acc_z".to_owned()];
+        let said = remedy(&f, None).expect(cause);
+        assert!(
+            said.contains("from the acceleration") && !said.contains("rate,"),
+            "{said}"
+        );
+    }
+}

@@ -96,8 +96,13 @@ impl Recorded {
                 left.seconds
             );
         }
-        Some(text::item("first record: ", &line).trim_start().to_owned())
+        Some(wrapped(&format!("first record: {line}")))
     }
+}
+
+/// A line of the answer, not longer than a terminal's.
+fn wrapped(line: &str) -> String {
+    text::item("", line).trim_start().to_owned()
 }
 
 /// A cause that was corrected on an axis.
@@ -197,38 +202,30 @@ impl Answer {
     /// For people.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.recorded.line().into_iter().collect();
-        lines.push(format!(
+        lines.push(wrapped(&format!(
             "correction {:#06x} written, read back, in use; the same stand again under another history",
             self.correction.number
-        ));
-        lines.extend(
-            self.correction
-                .notes
-                .iter()
-                .map(|note| format!("    note: {note}")),
-        );
-        let spans = SPANS_S.map(|span| format!("{:<30}", format!("{span} s")));
-        lines.push(format!(
-            "angle error, deg rms: read -> corrected (predicted by the model; limit: nothing wrong, same noise)\n    {:<18}{}",
-            "",
-            spans.join("").trim_end()
+        )));
+        let notes = self.correction.notes.iter();
+        lines.extend(notes.map(|note| text::item("note: ", note)));
+        lines.push(wrapped(
+            "angle error, deg rms: read -> corrected (predicted by the model; limit: nothing wrong, same noise)",
         ));
         for judged in &self.angle_errors {
             for gyro in GYROS {
-                let cells = SPANS_S.map(|span| {
+                let mut name = format!("{gyro}, {}", judged.what);
+                for span in SPANS_S {
                     let mut rows = judged.rows.iter();
                     let row = rows.find(|row| row.channel == gyro && row.span_s == span);
-                    format!("{:<30}", row.map_or_else(|| "-".to_owned(), cell))
-                });
-                lines.push(format!(
-                    "    {:<18}{}",
-                    format!("{gyro}, {}", judged.what),
-                    cells.join("").trim_end()
-                ));
+                    let cell = row.map_or_else(|| "-".to_owned(), cell);
+                    lines.push(format!("    {name:<18}{:>6}  {cell}", format!("{span} s")));
+                    name.clear();
+                }
             }
         }
-        lines.extend(self.angle_errors.iter().flat_map(flags));
-        lines.push(self.named());
+        let flags = self.angle_errors.iter().flat_map(flags);
+        lines.extend(flags.map(|line| wrapped(&line)));
+        lines.push(wrapped(&self.named()));
         lines
     }
 
@@ -370,5 +367,31 @@ mod tests {
             "{line}"
         );
         assert_eq!(Recorded::new(600.0).line(), None);
+    }
+
+    #[test]
+    fn no_line_is_longer_than_a_terminals() {
+        let row = |channel: &'static str, span_s: f64| Row {
+            channel,
+            span_s,
+            before_deg: 320.123,
+            after_deg: 106.861,
+            predicted_deg: 114.512,
+            limit_deg: Some(108.631),
+            worse: true,
+        };
+        let rows = GYROS
+            .iter()
+            .flat_map(|gyro| SPANS_S.map(|span| row(gyro, span)));
+        let cells: Vec<String> = rows.map(|row| cell(&row)).collect();
+        assert!(
+            cells.iter().all(|cell| cell.len() < 80 - 4 - 18 - 8),
+            "{cells:?}"
+        );
+        let line = wrapped(&"corrected rates no longer show ".repeat(9));
+        assert!(
+            line.lines().all(|line| line.chars().count() <= 80),
+            "{line}"
+        );
     }
 }
