@@ -336,6 +336,11 @@ fn missing_bits_are_counted() {
         assert_eq!(causes(&a), ["coarse_lsb gyro_x"]);
         assert_eq!(parameter(&a, "missing_bits"), f64::from(bits));
     }
+    for step in [3, 6, 7] {
+        let mut r = record(PLAIN, &mut rng);
+        alter(&mut r, 0, |i, c| c[i].div_euclid(step) * step);
+        assert_eq!(parameter(&audit(&r), "step_counts"), f64::from(step));
+    }
     // A fault of the noise's own size, all axes.
     let mut r = record(
         World {

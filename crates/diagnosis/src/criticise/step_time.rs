@@ -27,10 +27,8 @@ const MEMORY: usize = 64;
 const LOUD: [f64; 2] = [4.0, 16.0];
 /// Chance that a step came with a blow: nothing is known of it.
 const BLOWS: f64 = 0.5;
-/// Instants between two readings, before the later one, in their distance.
-const BETWEEN: [f64; 8] = [
-    0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375,
-];
+/// Instants between two readings that stand for all: 95 % of an even chance end in the middle of the outermost ones.
+const INSTANTS: u32 = 20;
 /// Part of the chances that is within 1.96 standard errors: a time that is told is told with an interval, and the chances have
 /// longer tails than a normal law of their spread.
 const HELD: f64 = 0.95;
@@ -114,7 +112,8 @@ impl Told<'_> {
         // A reading shows a step that came at any instant since the one before it.
         let instants = (from..).zip(&gains).flat_map(|(place, gain)| {
             let weight = (gain - most).exp();
-            BETWEEN.map(|before| (place as f64 - at as f64 - before, weight))
+            let before = (0..INSTANTS).map(|k| (f64::from(k) + 0.5) / f64::from(INSTANTS));
+            before.map(move |before| (place as f64 - at as f64 - before, weight))
         });
         let instants: Vec<(f64, f64)> = instants.collect();
         let sum: f64 = instants.iter().map(|(_, w)| w).sum();
@@ -194,11 +193,13 @@ mod tests {
     /// Readings of a record, the place of the step in it, and the longest ring.
     const N: usize = 2000;
     const RING: usize = 20;
+    /// Draws of each, and the least part that holds: 95 % less 3 standard deviations of so many.
+    const DRAWS: u64 = 300;
+    const LEAST: f64 = 0.912;
 
     /// Part of draws whose interval of 95 % has the instant in it: of a step of `height`, with a ring behind it, in noise of that
     /// variance.
-    fn covered(height: f64, ring: &dyn Fn(usize) -> f64, law: &dyn Fn(usize) -> f64) -> f64 {
-        const DRAWS: u64 = 300;
+    fn covered(height: f64, ring: &dyn Fn(u64, f64) -> f64, law: &dyn Fn(usize) -> f64) -> f64 {
         let mut unit = vec![0.0; 2 * MEMORY + 1];
         unit[MEMORY] = 1.0;
         let holds = |seed: &u64| {
@@ -209,13 +210,14 @@ mod tests {
             let y: Vec<f64> = (noise.iter().enumerate())
                 .map(|(i, z)| {
                     let behind = i.checked_sub(first);
-                    z * law(i).sqrt() + behind.map_or(0.0, |k| height + ring(k))
+                    z * law(i).sqrt()
+                        + behind.map_or(0.0, |_| height + ring(*seed, i as f64 - truth))
                 })
                 .collect();
             let mut gain = 0.0;
             let places = (first - 60..first + 60).map(|t| {
                 gain += y[t] * height - 0.5 * height * height;
-                (t + 1, -gain)
+                (t + 1, gain)
             });
             let (at, _) = places
                 .min_by(|a, b| a.1.total_cmp(&b.1))
@@ -238,20 +240,24 @@ mod tests {
     #[test]
     fn intervals_hold_at_any_height() {
         for height in [0.8, 1.2, 2.0, 3.5, 6.0] {
-            let part = covered(height, &|_| 0.0, &|_| 1.0);
-            assert!((0.925..=1.0).contains(&part), "{height}: {part}");
+            let part = covered(height, &|_, _| 0.0, &|_| 1.0);
+            assert!(part >= LEAST, "{height}: {part}");
         }
     }
 
     #[test]
     fn a_ring_behind_it_and_a_loud_stretch_are_no_error() {
-        // A blow that rings against the step for some readings, as a stand at 18 Hz is read at 20 Hz.
-        let ring = |k: usize| -7.0 * (-(k as f64) / 1.3).exp();
+        // A blow of up to 11 times the noise rings at 18 Hz, and is read at 20 Hz.
+        let ring = |seed: u64, behind: f64| {
+            let size = 11.0 * (seed * 29 % 83) as f64 / 83.0;
+            size * (std::f64::consts::TAU * 0.9 * behind).cos() * (-behind / 1.2).exp()
+        };
         let part = covered(2.5, &ring, &|_| 1.0);
-        assert!(part >= 0.925, "ring: {part}");
-        // Noise of twice the size while a motor turns.
+        // One against the step and about as large as that looks like none yet: not all of them can be told from a later step.
+        assert!(part >= 0.75, "ring: {part}");
+        // Noise of twice the size and more while a motor turns.
         let loud = |i: usize| if i / 300 % 2 == 1 { 4.0 } else { 0.5 };
-        let part = covered(1.8, &|_| 0.0, &loud);
-        assert!(part >= 0.925, "loud: {part}");
+        let part = covered(1.8, &|_, _| 0.0, &loud);
+        assert!(part >= LEAST, "loud: {part}");
     }
 }
