@@ -21,6 +21,7 @@ use crate::search::Search;
 use crate::test_level::{CLAIM_LEVEL, CheckId, Outcome};
 pub use crate::two_level::fit::two_level;
 use crate::two_level::fit::{Coordinates, again, coordinates, fitted, many_ahead};
+use crate::two_level::of_blocks::OfBlocks;
 use crate::two_level::sides::{Side, Sides};
 use numerics::tails::normal_tail;
 
@@ -337,17 +338,13 @@ impl<'a> Field<'a> {
         steps.map(|column| panel.add(&column)).collect()
     }
 
-    /// The processes of a state that wander. Correlation times are in samples: of blocks, they are shorter by the block.
+    /// The processes of a state that wander, as the blocks show them.
     fn processes(&self, state: &State) -> Processes {
-        let shorter = (self.length as f64).ln();
         let of = |t: &Term| match &t.form {
             Form::Covariance(c, theta) if t.wanders() => {
-                let mut theta = theta.clone();
-                theta[0] += shorter;
-                if let Some(tau) = theta.get_mut(1) {
-                    *tau = (*tau - shorter).max(0.1);
-                }
-                Some((Arc::clone(c), theta))
+                let (process, length) = (Arc::clone(c), self.length);
+                let means: Arc<dyn Covariance> = Arc::new(OfBlocks { process, length });
+                Some((means, theta.clone()))
             }
             _ => None,
         };

@@ -3,4 +3,5 @@
 pub mod compare;
 pub mod filter_bank;
 pub mod fit;
+mod of_blocks;
 mod sides;

@@ -132,7 +132,10 @@ impl Covariance for Process {
     }
 
     fn bounds(&self, samples: usize) -> Vec<(f64, f64)> {
-        vec![(-16.0, 6.0), (0.0, (samples as f64 / 10.0).ln())]
+        // At half the sample rate it is up to a hundred times as loud as the white noise, however long its correlation time: there
+        // its density is the variance over twice that time.
+        let longest = samples as f64 / 10.0;
+        vec![(-16.0, (200.0 * longest).ln()), (0.0, longest.ln())]
     }
 
     fn starts(&self, samples: usize) -> Vec<Vec<f64>> {
