@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use model::effects::shock::LONGEST_S;
+use model::effects::shock::{LONGEST_RING_S, LONGEST_S, PERIODS};
 
 use crate::fit::likelihood::{Bins, Dct};
 use crate::fit::scan::residual;
@@ -18,13 +18,16 @@ use crate::search::searched::Searched;
 use crate::test_level::CLAIM_LEVEL;
 use grids::{Known, coordinates, half_sines, rings};
 use meetings::meet;
+use numerics::tails::chi_square;
 
 mod grids;
 mod meetings;
 
-/// Readings of the piece over those of the blow, and the fewest.
+/// Readings of the piece over those of the blow, and the fewest; of a long blow fewer times as many tell what the noise is about it.
 const PIECE: usize = 8;
 const LEAST_PIECE: usize = 256;
+const LONG_PIECE: usize = 2;
+const ENOUGH: usize = 4096;
 /// Likelihood ratio by which more than one reading has to tell of a blow that has a course in time.
 const COURSE: f64 = 12.0;
 
@@ -99,7 +102,9 @@ struct Sizes {
 impl Piece {
     fn new(blow: &Blow, searched: &[&Searched<'_>]) -> Self {
         let n = searched.first().map_or(0, |s| s.search.panel.bins.n);
-        let wanted = (PIECE * blow.readings.len()).max(LEAST_PIECE);
+        let own = blow.readings.len();
+        let wanted = (PIECE * own).min(ENOUGH).max(LONG_PIECE * own);
+        let wanted = wanted.max(LEAST_PIECE);
         let length = wanted.next_power_of_two().min(n);
         let middle = blow.readings.start.midpoint(blow.readings.end);
         let start = middle.saturating_sub(length / 2).min(n - length);
@@ -144,16 +149,19 @@ impl Piece {
                 vec![(0..n).map(at).collect::<Vec<f64>>()]
             }
             Shape::Ring(fades, pitch) => {
-                let of = |i: usize, phase: f64| {
-                    let since = i as f64 - start;
-                    if since < 0.0 {
-                        0.0
-                    } else {
-                        (-since / fades).exp() * (pitch * since - phase).cos()
-                    }
-                };
-                let column = |phase: f64| (0..n).map(|i| of(i, phase)).collect();
-                vec![column(0.0), column(PI / 2.0)]
+                let kept = (-fades.recip()).exp();
+                let [a, b] = [kept * pitch.cos(), kept * pitch.sin()];
+                let first = (start.ceil().max(0.0) as usize).min(n);
+                let since = first as f64 - start;
+                let (mut sin, mut cos) = (pitch * since).sin_cos();
+                let size = (-since / fades).exp();
+                (sin, cos) = (size * sin, size * cos);
+                let [mut even, mut odd] = [vec![0.0; n], vec![0.0; n]];
+                for (even, odd) in even[first..].iter_mut().zip(&mut odd[first..]) {
+                    (*even, *odd) = (cos, sin);
+                    (cos, sin) = (a * cos - b * sin, b * cos + a * sin);
+                }
+                vec![even, odd]
             }
         };
         let there = |c: &Vec<f64>| c.iter().any(|v| v.abs() > 1e-6);
@@ -280,10 +288,9 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     if meet(&piece, blow, &felt, searched, (lr, freedom)) {
         return None;
     }
-    if location
-        .get(1)
-        .is_none_or(|(length, error)| length - 2.0 * error > LONGEST_S)
-    {
+    let (length, error) = *location.get(1)?;
+    let is_long = length - 2.0 * error > LONGEST_S;
+    if is_long && !rings_on(&piece, &columns, &felt, &location) {
         return None;
     }
     let start = location.first().map_or(0.0, |l| l.1 * rate_hz);
@@ -295,6 +302,23 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
         location,
         felt: felt.iter().map(of).collect(),
         single,
+    })
+}
+
+/// Whether what is longer than a blow is a ring of many periods, which leaves nothing but noise of its readings.
+fn rings_on(piece: &Piece, columns: &[Vec<f64>], felt: &[usize], location: &[(f64, f64)]) -> bool {
+    let [_, (length, error), (hz, _)] = location else {
+        return false;
+    };
+    if length - 2.0 * error > LONGEST_RING_S || hz * length < PERIODS {
+        return false;
+    }
+    let degrees = (piece.all.len() - 1) as f64;
+    let sizes = piece.sizes(columns, felt);
+    felt.iter().zip(sizes).all(|(k, sizes)| {
+        let channel = &piece.channels[*k];
+        let left = channel.over(&channel.left, &channel.left) - sizes.lr;
+        chi_square(left, degrees) > threshold::false_alarm()
     })
 }
 

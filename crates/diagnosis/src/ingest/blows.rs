@@ -1,5 +1,5 @@
-//! Short blows of a base at rest: where in the record something happens that is over within a second, on one channel or on
-//! several at once.
+//! Blows of a base at rest: where in the record something happens that is over within a second, or rings on for some
+//! (`long_rings`), on one channel or on several at once.
 //!
 //! The whitened readings of each channel are held against half sines and decaying rings of all lengths at all times. Of one
 //! shape at one time the energies of the channels that feel it add up. What stands out has to be all that does: a noise with
@@ -13,6 +13,8 @@ use model::effects::shock::LONGEST_S;
 
 use crate::fit::likelihood::{Bins, Dct, Noise};
 use crate::fit::threshold;
+use crate::ingest::base_turns::overlap;
+use crate::ingest::long_rings;
 use crate::ingest::types::Target;
 use crate::test_level::on_two_threads;
 use numerics::order_statistics::{median, robust_sigma};
@@ -23,9 +25,9 @@ const STEPS: usize = 8;
 /// Longest time constant of a ring, readings: rings of that time constant have some 80 pitches.
 const LONGEST_RING: f64 = 32.0;
 /// Time constants of a ring in its duration, in which it falls to exp(-3).
-const FALLEN: f64 = 3.0;
+pub(super) const FALLEN: f64 = 3.0;
 /// Distance of two pitches over the width of a ring's peak, 1 / its time constant, rad per reading.
-const PITCH: f64 = 1.2;
+pub(super) const PITCH: f64 = 1.2;
 /// Chance, where it is given, that a channel feels one by its noise: of a shape of several readings, and of a single one, of
 /// which another channel has a fault of its own now and then.
 const FELT: f64 = 1e-2;
@@ -34,7 +36,7 @@ const FELT_SINGLE: f64 = 1e-3;
 const NO_SINGLE: f64 = 12.0;
 /// Most blows in a record, and most places that nearly stand out beside them, with the likelihood ratio that "nearly" allows:
 /// one clean record in ten has such a place.
-const MOST: usize = 4;
+pub(super) const MOST: usize = 4;
 const BESIDE: usize = 3;
 const NEARLY: f64 = 12.0;
 /// Readings before and after it that tell of the level, and the part of its energy that stays where that steps.
@@ -95,7 +97,7 @@ impl Shape {
             width = (width * APART).round().max(width + 1.0);
         }
         let mut fades = 1.0;
-        while fades <= (longest / FALLEN).min(LONGEST_RING) {
+        while fades <= longest_fades(rate_hz) {
             let pitches = (PI * fades / PITCH).round() as usize;
             let pitch = |i: usize| PI * (i as f64 + 0.5) / pitches as f64;
             all.extend((0..pitches).map(|i| Self::Ring(fades, pitch(i))));
@@ -111,6 +113,11 @@ impl Shape {
             Self::Ring(fades, pitch) => rings(e, fades, pitch),
         }
     }
+}
+
+/// Longest time constant of the rings that are looked for at all times, readings.
+fn longest_fades(rate_hz: f64) -> f64 {
+    ((LONGEST_S * rate_hz).max(1.0) / FALLEN).min(LONGEST_RING)
 }
 
 /// Energy in a half sine that begins at each reading.
@@ -129,7 +136,7 @@ fn half_sines(e: &[f64], width: usize) -> Vec<f64> {
 }
 
 /// Energy in the cosine and the sine of a ring that begins at each reading.
-fn rings(e: &[f64], fades: f64, pitch: f64) -> Vec<f64> {
+pub(super) fn rings(e: &[f64], fades: f64, pitch: f64) -> Vec<f64> {
     let kept = (-1.0 / fades).exp();
     let (sine, cosine) = pitch.sin_cos();
     let [a, b] = [kept * cosine, kept * sine];
@@ -225,9 +232,11 @@ pub(crate) fn blows(
         own.unwrap_or((&t.noise, t.white))
     });
     let noise: Vec<(&Noise, f64)> = noise.collect();
-    let whitened: Vec<Vec<f64>> = (noise.iter().zip(&readings))
+    let mut whitened: Vec<Vec<f64>> = (noise.iter().zip(&readings))
         .map(|(noise, y)| whitened(y, *noise, dct, bins))
         .collect();
+    let mut found = long_rings::take_off(&mut whitened, rate_hz, longest_fades(rate_hz).max(1.0));
+    whitened.iter_mut().for_each(|e| even_out(e));
     let changes = |place: Place, shape: Shape| {
         let felt = felt(&whitened, place, shape);
         let all = felt.iter().map(|(energy, k)| {
@@ -239,15 +248,12 @@ pub(crate) fn blows(
     let shapes = Shape::all(rate_hz);
     let mut places = standing_out(&whitened, &shapes, threshold::false_alarm());
     places.sort_by(|a, b| b.excess.total_cmp(&a.excess));
-    let (mut found, mut seen) = (vec![], vec![]);
+    let mut seen: Vec<Range<usize>> = found.iter().map(|b| b.readings.clone()).collect();
     let mut beside = 0;
     for place in places {
         let shape = shapes[place.shape];
         let own = with_margin(place.at, shape, whitened[0].len());
-        if seen
-            .iter()
-            .any(|s: &Range<usize>| s.start < own.end && own.start < s.end)
-        {
+        if seen.iter().any(|s| overlap(s, &own)) {
             continue;
         }
         seen.push(own.clone());
@@ -266,10 +272,7 @@ pub(crate) fn blows(
             readings: own,
             first: place.at,
             shape,
-            felt: felt(&whitened, place, shape)
-                .into_iter()
-                .map(|f| f.1)
-                .collect(),
+            felt: (felt(&whitened, place, shape).iter().map(|f| f.1)).collect(),
         });
         if found.len() > MOST {
             return vec![];
@@ -279,7 +282,7 @@ pub(crate) fn blows(
 }
 
 /// The readings of a shape from a place on, and a quarter of them on either side.
-fn with_margin(at: usize, shape: Shape, n: usize) -> Range<usize> {
+pub(super) fn with_margin(at: usize, shape: Shape, n: usize) -> Range<usize> {
     let reach = shape.reach();
     let margin = 1 + reach / 4;
     at.saturating_sub(margin)..(at + reach + margin).min(n)
@@ -330,7 +333,7 @@ fn is_single(whitened: &[Vec<f64>], place: Place, shape: Shape) -> bool {
     energy - sum(&at) < NO_SINGLE && certain.count() < 2
 }
 
-/// Readings of a target as its first fit whitens them, where they are louder than elsewhere by that.
+/// Readings of a target as its first fit whitens them.
 fn whitened(y: &[f64], (noise, white): (&Noise, f64), dct: &Dct, bins: &Bins) -> Vec<f64> {
     let mut c = dct.forward(y);
     let g = noise.everywhere(bins);
@@ -339,7 +342,11 @@ fn whitened(y: &[f64], (noise, white): (&Noise, f64), dct: &Dct, bins: &Bins) ->
         .zip(&g)
         .skip(1)
         .for_each(|(c, g)| *c /= (white * g).sqrt());
-    let mut e = dct.inverse(&c);
+    dct.inverse(&c)
+}
+
+/// Takes off readings where they are louder than elsewhere how much they are.
+fn even_out(e: &mut [f64]) {
     let spreads: Vec<f64> = e.chunks(BLOCK).map(robust_sigma).collect();
     for (b, block) in e.chunks_mut(BLOCK).enumerate() {
         // Of three blocks the middle one: a blow is in one of them.
@@ -349,7 +356,6 @@ fn whitened(y: &[f64], (noise, white): (&Noise, f64), dct: &Dct, bins: &Bins) ->
             block.iter_mut().for_each(|e| *e /= spread);
         }
     }
-    e
 }
 
 /// By how much the shape that stands out most at a reading does, and its number.

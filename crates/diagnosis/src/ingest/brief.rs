@@ -1,11 +1,11 @@
-//! What is over within two seconds and far beyond the noise: a knock, before anything is fitted.
+//! What is over within two seconds, or rings down within some, and is far beyond the noise: a knock, before anything is fitted.
 //!
 //! A knock of a hundred standard deviations holds more energy at the frequencies of a moving base than a base that moves has, and
 //! its edges are jumps to readings beside it. Both are asked of what it leaves. Whether it is a shock, the final model tells.
 
 use std::ops::Range;
 
-use model::effects::shock::LONGEST_S;
+use model::effects::shock::{LONGEST_RING_S, LONGEST_S, PERIODS};
 use numerics::order_statistics::{median, robust_sigma};
 
 use super::spikes::spike_limit;
@@ -18,6 +18,9 @@ const TOLD: usize = 400;
 const LONGEST: f64 = 2.0;
 /// Part of [`LONGEST_S`] in which nothing is far off after it has ended, and that is left out with it on either side.
 const APART: f64 = 0.25;
+/// Energy of the first half of a ring over that of the second, at least: by its end it is hardly beyond the noise any more. Of what
+/// stays as it is the two are the same.
+const FALLS: f64 = 4.0;
 /// Fewest far readings of one, and most of them in a record: a machine that knocks has more.
 const FEWEST: usize = 3;
 const MOST: usize = 4;
@@ -88,13 +91,28 @@ pub(super) fn events(y: &[f64], rate_hz: f64) -> Vec<Range<usize>> {
     let apart = (APART * second).ceil() as usize;
     let reach = (BESIDE * second) as usize;
     let (all, _) = stretches(y, reach, apart, (MOST_SECONDS * second) as usize);
-    let longest = LONGEST * second;
-    if all.len() > MOST || all.iter().any(|s| s.readings.len() as f64 > longest) {
+    let long = |s: &&Stretch| s.readings.len() as f64 > LONGEST * second;
+    let longest = (LONGEST * LONGEST_RING_S * rate_hz) as usize;
+    let mut longer = all.iter().filter(long);
+    if all.len() > MOST || !longer.all(|s| rings_down(&y[s.readings.clone()], longest)) {
         return vec![];
     }
     let margin =
         |own: &Range<usize>| own.start.saturating_sub(apart)..(own.end + apart).min(y.len());
     all.iter().map(|s| margin(&s.readings)).collect()
+}
+
+/// Whether readings that take no longer than asked swing about their level, and less and less.
+fn rings_down(y: &[f64], longest: usize) -> bool {
+    let known: Vec<f64> = y.iter().copied().filter(|v| v.is_finite()).collect();
+    let level = median(&known);
+    let crossed = known
+        .windows(2)
+        .filter(|w| (w[0] > level) != (w[1] > level));
+    let energy = |part: &[f64]| part.iter().map(|v| (v - level).powi(2)).sum::<f64>();
+    let (first, second) = known.split_at(known.len() / 2);
+    let swings = crossed.count() as f64 > 2.0 * PERIODS;
+    y.len() <= longest && swings && energy(first) > FALLS * energy(second)
 }
 
 #[cfg(test)]
@@ -111,6 +129,14 @@ mod tests {
             5000..5010 => 300.0 * (std::f64::consts::PI * (i as f64 - 4999.5) / 10.0).sin(),
             _ => 0.0,
         };
+        let ring = |i: usize| {
+            let since = i as f64 - 6000.0;
+            let course = 100.0 * (-since / 20.0).exp() * (2.0 * since).cos();
+            if since < 0.0 { 0.0 } else { course }
+        };
+        let found = events(&with(&ring), 20.0);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].start < 6000 && found[0].end > 6050, "{found:?}");
         let found = events(&with(&knock), 20.0);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].start < 5000 && found[0].end > 5010 && found[0].len() < 30);
@@ -119,7 +145,15 @@ mod tests {
         let again = |i: usize| if i % 1000 < 5 { 50.0 } else { 0.0 };
         let walk = |i: usize| 200.0 * (i as f64 / 3000.0).sin();
         let long = |i: usize| if (3000..3050).contains(&i) { 40.0 } else { 0.0 };
-        for other in [&step as &dyn Fn(usize) -> f64, &far, &again, &walk, &long] {
+        let buzz = |i: usize| long(i) * (1.3 * i as f64).sin();
+        for other in [
+            &step as &dyn Fn(usize) -> f64,
+            &far,
+            &again,
+            &walk,
+            &long,
+            &buzz,
+        ] {
             assert_eq!(events(&with(other), 20.0), vec![]);
         }
     }

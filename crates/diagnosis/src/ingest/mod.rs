@@ -12,6 +12,7 @@ mod handled;
 pub(crate) mod jumps;
 pub mod kalman;
 pub mod lattice;
+mod long_rings;
 pub mod motion;
 pub(crate) mod spikes;
 pub mod types;

@@ -22,6 +22,10 @@ pub static EFFECT: Shock = Shock;
 
 /// Longest shock, s: what takes longer is a turn of the base.
 pub const LONGEST_S: f64 = 1.0;
+/// Longest ring, s, by the time in which it falls to a twentieth: a mount of little damping rings on.
+pub const LONGEST_RING_S: f64 = 5.0;
+/// Periods in that time from which on a ring may take longer than any other shock: what swings once or twice is a turn of the base.
+pub const PERIODS: f64 = 3.0;
 /// A ring has fallen to exp(-3), a twentieth, by its duration; it is followed until it is a thousandth.
 const FALLEN: f64 = 3.0;
 const OVER: f64 = 7.0;
@@ -128,7 +132,7 @@ impl Effect for Shock {
             title: "Shock",
             physics: "The base is knocked: w(t) = peak sin(pi (t - time) / duration) for a blow that pushes once, peak exp(-3 (t - time) / duration) cos(2 pi frequency (t - time) + phase) where the mount rings, read at the sample rate. Gyros and accelerometers feel it at the same time, each by its own peak and phase. An input, no error of the sensor.",
             excitation: "Nothing; at least two readings of it, or two channels that feel it.",
-            test: "Likelihood ratio of half sines and rings of all lengths up to a second at all times, summed over the channels that feel them; again under the final model, where its readings are left out.",
+            test: "Likelihood ratio of half sines and rings of all lengths up to a second, and of rings of many periods up to five, at all times, summed over the channels that feel them; again under the final model, where its readings are left out.",
             remedy: "Put the stand where nobody touches it, or fasten what fell; let the filter leave out the readings of that time.",
             figure: "The rate around it.",
             example: Example::new(

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use model::effects::shock::LONGEST_S;
+use model::effects::shock::{LONGEST_RING_S, LONGEST_S};
 
 use super::{Piece, Place};
 use crate::ingest::blows::{Blow, Shape};
@@ -172,11 +172,11 @@ fn resolved(left: &[f64], steps: &[f64]) -> bool {
     left.iter().zip(steps).all(|(left, step)| left >= step)
 }
 
-/// The rings that a blow may be; none where a second has too few readings of one.
+/// The rings that a blow may be; none where it has too few readings of one.
 pub(super) fn rings(piece: &Piece, blow: &Blow, rate_hz: f64) -> Known {
     const SHORTEST: f64 = 0.6;
     const PITCHES: [f64; 2] = [0.03, PI - 0.03];
-    let longest = LONGER * LONGEST_S * rate_hz / 3.0;
+    let longest = LONGER * LONGEST_RING_S * rate_hz / 3.0;
     if longest < 2.0 * SHORTEST {
         return Known { places: vec![] };
     }

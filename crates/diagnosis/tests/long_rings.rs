@@ -1,0 +1,168 @@
+//! Mounts that are knocked and ring on for seconds: size, duration, frequency and axes are drawn, and what is told is graded by rate.
+//! What is as loud for as long and does not ring is no shock. `IMU_STAND_SEED` takes other draws.
+
+mod draws;
+
+use std::f64::consts::{PI, TAU};
+
+use diagnosis::result::Diagnosis;
+use diagnosis::{DiagnoseOptions, diagnose};
+use model::ModelFile;
+use model::record::{Channel, Record};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Uniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+const RATE_HZ: f64 = 20.0;
+const SECONDS: f64 = 400.0;
+/// Noise of a reading of the paper's gyro, deg/s: 5.27 deg/sqrt(h) at 20 Hz.
+const SIGMA: f64 = 0.393;
+
+fn draws(of: u64) -> Xoshiro256PlusPlus {
+    let seed = draws::seed(20_261_130);
+    println!("seed {seed}");
+    Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
+}
+
+fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+    Uniform::new(low, high).map_or(low, |u| u.sample(rng))
+}
+
+fn by_ratio(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+    between(rng, low.ln(), high.ln()).exp()
+}
+
+fn stand(rng: &mut Xoshiro256PlusPlus) -> Record {
+    let seed = between(rng, 0.0, 1e9) as u64;
+    model::simulate(&ModelFile::paper(), SECONDS, RATE_HZ, seed).expect("a run")
+}
+
+/// Adds a signal to a channel, and rounds to its counts as the converter does.
+fn add(record: &mut Record, name: &str, of: impl Fn(f64) -> f64) {
+    let own = |c: &&mut Channel| c.name == name;
+    let channel = record.channels.iter_mut().find(own).expect("a channel");
+    let lsb = channel.lsb.expect("counts");
+    let counts = channel.counts.as_mut().expect("counts");
+    for (i, (v, c)) in channel.values.iter_mut().zip(counts).enumerate() {
+        *c += (of(i as f64 / RATE_HZ) / lsb).round() as i32;
+        *v = f64::from(*c) * lsb;
+    }
+}
+
+fn told(record: &Record) -> Diagnosis {
+    let options = DiagnoseOptions {
+        no_evidence: true,
+        ..DiagnoseOptions::default()
+    };
+    diagnose(record, &options).expect("a diagnosis").diagnosis
+}
+
+fn said(d: &Diagnosis) -> String {
+    let found = d
+        .findings
+        .iter()
+        .map(|f| format!("{} on {:?}", f.cause, f.channels));
+    let left = d
+        .unexplained
+        .iter()
+        .map(|u| format!("unexplained: {}", u.what));
+    found.chain(left).collect::<Vec<_>>().join("; ")
+}
+
+/// At most this chance that a rate as asked gives so few hits.
+fn asked(what: &str, hits: u64, of: u64, rate: f64) {
+    println!("{what}: {hits} of {of}");
+    let chance = 1.0 - numerics::tails::hits_at_least(hits + 1, of, rate);
+    assert!(chance > 1e-3, "{what}: {hits} of {of}, less than {rate}");
+}
+
+#[test]
+fn a_ring_of_seconds_is_named_alone_and_its_values_hold() {
+    let runs = draws::of(12, 60);
+    let rng = &mut draws(1);
+    let (mut alone, mut inside, mut values) = (0, 0, 0);
+    for _ in 0..runs {
+        let mut record = stand(rng);
+        let duration = by_ratio(rng, 1.2, 4.5);
+        let hz = by_ratio(rng, 2.7, 9.0);
+        let (at, phase) = (between(rng, 0.1, 0.9) * SECONDS, between(rng, 0.0, TAU));
+        let ring = |t: f64| {
+            let since = t - at;
+            let course = (-3.0 * since / duration).exp() * (TAU * hz * since + phase).cos();
+            if since < 0.0 { 0.0 } else { course }
+        };
+        let axes = between(rng, 1.0, 3.99) as usize;
+        let first = GYROS[0];
+        let mut peak = 0.0;
+        for axis in &GYROS[..axes] {
+            let size = SIGMA * by_ratio(rng, 20.0, 200.0);
+            add(&mut record, axis, |t| size * ring(t));
+            if *axis == first {
+                let all = (0..(SECONDS * RATE_HZ) as usize).map(|i| ring(i as f64 / RATE_HZ));
+                peak = size * all.fold(0.0f64, |most, v| most.max(v.abs()));
+            }
+        }
+        let d = told(&record);
+        let planted = format!("{duration:.2} s, {hz:.1} Hz at {at:.1} s, {peak:.1} deg/s");
+        let [f] = &d.findings[..] else {
+            println!("{planted}: {}", said(&d));
+            continue;
+        };
+        if f.cause != "shock" || f.channels.len() != axes || !d.unexplained.is_empty() {
+            println!("{planted}: {}", said(&d));
+            continue;
+        }
+        alone += 1;
+        let of_first = f.per_channel.get(first).unwrap_or(&f.parameters);
+        for (name, p, wanted) in [
+            ("time", &f.parameters, at),
+            ("duration", &f.parameters, duration),
+            ("frequency", &f.parameters, hz),
+            ("peak", of_first, peak),
+        ] {
+            let p = &p[name];
+            let error = p.std_error.expect("an error");
+            values += 1;
+            inside += u64::from((p.value - wanted).abs() < 1.96 * error);
+            if (p.value - wanted).abs() >= 1.96 * error {
+                println!("{planted}: {name} {} +- {error}", p.value);
+            }
+        }
+    }
+    asked("alone", alone, runs, 0.95);
+    asked("values within their intervals", inside, values, 0.93);
+}
+
+#[test]
+fn a_tone_and_a_hand_of_seconds_are_no_shocks() {
+    let runs = draws::of(4, 12);
+    let rng = &mut draws(2);
+    let (mut none, mut all) = (0, 0);
+    for _ in 0..runs {
+        let (at, lasts) = (between(rng, 0.1, 0.9) * SECONDS, between(rng, 1.5, 5.0));
+        let (size, phase) = (SIGMA * by_ratio(rng, 20.0, 200.0), between(rng, 0.0, TAU));
+        let (hz, slow) = (by_ratio(rng, 2.7, 9.0), between(rng, 0.4, 1.5));
+        let part = |t: f64| Some((t - at) / lasts).filter(|p| (0.0..1.0).contains(p));
+        let tone = |t: f64| part(t).map_or(0.0, |_| size * (TAU * hz * t + phase).cos());
+        let falls = |t: f64| part(t).map_or(0.0, |p| (1.0 - p) * tone(t));
+        let hand = |t: f64| part(t).map_or(0.0, |p| size * (PI * p).sin() * (TAU * slow * t).sin());
+        let kinds: [(&str, &dyn Fn(f64) -> f64); 3] = [
+            ("a tone", &tone),
+            ("a tone that falls", &falls),
+            ("a hand", &hand),
+        ];
+        for (what, of) in kinds {
+            let mut record = stand(rng);
+            add(&mut record, GYROS[0], of);
+            let d = told(&record);
+            all += 1;
+            let shocks = d.findings.iter().filter(|f| f.cause == "shock").count();
+            none += u64::from(shocks == 0);
+            if shocks > 0 {
+                println!("{what} of {lasts:.2} s, {size:.1} deg/s: {}", said(&d));
+            }
+        }
+    }
+    asked("no shock", none, all, 0.99);
+}
