@@ -290,7 +290,7 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     }
     let (length, error) = *location.get(1)?;
     let is_long = length - 2.0 * error > LONGEST_S;
-    if is_long && !rings_on(&piece, &columns, &felt, &location) {
+    if is_long && !rings_on(&piece, blow, (&columns, &felt), &location) {
         return None;
     }
     let start = location.first().map_or(0.0, |l| l.1 * rate_hz);
@@ -306,20 +306,35 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
 }
 
 /// Whether what is longer than a blow is a ring of many periods, which leaves nothing but noise of its readings.
-fn rings_on(piece: &Piece, columns: &[Vec<f64>], felt: &[usize], location: &[(f64, f64)]) -> bool {
+fn rings_on(
+    piece: &Piece,
+    blow: &Blow,
+    (columns, felt): (&[Vec<f64>], &[usize]),
+    location: &[(f64, f64)],
+) -> bool {
     let [_, (length, error), (hz, _)] = location else {
         return false;
     };
     if length - 2.0 * error > LONGEST_RING_S || hz * length < PERIODS {
         return false;
     }
-    let degrees = (piece.all.len() - 1) as f64;
-    let sizes = piece.sizes(columns, felt);
-    felt.iter().zip(sizes).all(|(k, sizes)| {
-        let channel = &piece.channels[*k];
-        let left = channel.over(&channel.left, &channel.left) - sizes.lr;
-        chi_square(left, degrees) > threshold::false_alarm()
-    })
+    let shapes: Vec<Vec<f64>> = columns.iter().map(|c| piece.dct.forward(c)).collect();
+    let own = blow.readings.start - piece.all.start..blow.readings.end - piece.all.start;
+    felt.iter()
+        .zip(piece.sizes(columns, felt))
+        .all(|(k, sizes)| {
+            let channel = &piece.channels[*k];
+            let mut left = channel.left.clone();
+            for (shape, beta) in shapes.iter().zip(sizes.beta) {
+                left.iter_mut().zip(shape).for_each(|(v, s)| *v -= beta * s);
+            }
+            left.iter_mut()
+                .zip(&channel.weight)
+                .for_each(|(v, w)| *v *= w.sqrt());
+            let left = piece.dct.inverse(&left);
+            let square = left[own.clone()].iter().map(|v| v * v).sum::<f64>();
+            chi_square(square, own.len() as f64) > threshold::false_alarm()
+        })
 }
 
 /// Single far readings of a record, that of a blow counted once.

@@ -14,10 +14,11 @@ use model::effects::shock::LONGEST_S;
 use crate::fit::likelihood::{Bins, Dct, Noise};
 use crate::fit::threshold;
 use crate::ingest::base_turns::overlap;
-use crate::ingest::long_rings;
 use crate::ingest::types::Target;
 use crate::test_level::on_two_threads;
 use numerics::order_statistics::{median, robust_sigma};
+
+mod long_rings;
 
 /// Half sines have lengths this far apart; their ends are sought in steps of this part of them.
 const APART: f64 = 1.4;

@@ -12,7 +12,6 @@ mod handled;
 pub(crate) mod jumps;
 pub mod kalman;
 pub mod lattice;
-mod long_rings;
 pub mod motion;
 pub(crate) mod spikes;
 pub mod types;

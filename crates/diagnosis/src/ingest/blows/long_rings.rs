@@ -10,8 +10,8 @@ use std::ops::Range;
 use model::effects::shock::{LONGEST_RING_S, LONGEST_S, PERIODS};
 use numerics::order_statistics::robust_sigma;
 
-use super::blows::{Blow, FALLEN, MOST, PITCH, Shape, rings, with_margin};
-use super::spikes::spike_limit;
+use super::{Blow, FALLEN, MOST, PITCH, Shape, rings, with_margin};
+use crate::ingest::spikes::spike_limit;
 
 /// Fewest far readings of one: a ring over three periods has two in each.
 const FEWEST: usize = 2 * PERIODS as usize;
