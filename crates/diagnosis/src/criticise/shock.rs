@@ -290,7 +290,7 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
     }
     let (length, error) = *location.get(1)?;
     let is_long = length - 2.0 * error > LONGEST_S;
-    if is_long && !rings_on(&piece, blow, (&columns, &felt), &location) {
+    if is_long && !rings_on(&piece, (blow, best), (&columns, &felt), &location) {
         return None;
     }
     let start = location.first().map_or(0.0, |l| l.1 * rate_hz);
@@ -308,7 +308,7 @@ pub(crate) fn fit(blow: &Blow, searched: &[&Searched<'_>], rate_hz: f64) -> Opti
 /// Whether what is longer than a blow is a ring of many periods, which leaves nothing but noise of its readings.
 fn rings_on(
     piece: &Piece,
-    blow: &Blow,
+    (blow, best): (&Blow, Place),
     (columns, felt): (&[Vec<f64>], &[usize]),
     location: &[(f64, f64)],
 ) -> bool {
@@ -319,7 +319,10 @@ fn rings_on(
         return false;
     }
     let shapes: Vec<Vec<f64>> = columns.iter().map(|c| piece.dct.forward(c)).collect();
-    let own = blow.readings.start - piece.all.start..blow.readings.end - piece.all.start;
+    // All of it is asked, not only what was left out: the first of a tone that goes on rings as well.
+    let ends = (best.0 + best.1.reach() as f64) as usize;
+    let [start, end] = [blow.readings.start, blow.readings.end].map(|i| i - piece.all.start);
+    let own = start..end.max(ends).min(piece.all.len());
     felt.iter()
         .zip(piece.sizes(columns, felt))
         .all(|(k, sizes)| {

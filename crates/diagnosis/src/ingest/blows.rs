@@ -73,7 +73,7 @@ pub(crate) enum Shape {
 
 impl Shape {
     /// Readings that it takes.
-    fn reach(self) -> usize {
+    pub fn reach(self) -> usize {
         match self {
             Self::HalfSine(width) => width.ceil() as usize,
             Self::Ring(fades, _) => (2.0 * FALLEN * fades).ceil() as usize,
