@@ -1,7 +1,7 @@
 //! Accelerometers of the paper's stand, diagnosed beside its gyros: what is planted in one is drawn, and what is told of it is
 //! graded by rate. `IMU_STAND_SEED` takes other draws.
 
-mod draws;
+mod rates;
 
 use std::f64::consts::TAU;
 
@@ -9,26 +9,15 @@ use diagnosis::result::{Diagnosis, Finding};
 use diagnosis::{DiagnoseOptions, diagnose_channels};
 use model::ModelFile;
 use model::record::{Channel, Record};
-use rand_core::SeedableRng;
-use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rates::{GYROS, RATE_HZ, asked, between, draws, rng, said};
 
-const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
 const ACCELEROMETERS: [&str; 3] = ["acc_x", "acc_y", "acc_z"];
-const RATE_HZ: f64 = 20.0;
+/// Seed of the draws.
+const OWN_SEED: u64 = 20_261_124;
 const SECONDS: f64 = 600.0;
 /// Noise of a reading, m/s^2: 4.7 mV at 800 mV/g, and a twelfth of a squared count of 4 mg.
 const SIGMA: f64 = 0.0588;
-
-fn draws(of: u64) -> Xoshiro256PlusPlus {
-    let seed = draws::seed(20_261_124);
-    println!("seed {seed}");
-    Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
-}
-
-fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
-    Uniform::new(low, high).map_or(low, |u| u.sample(rng))
-}
 
 /// Ten minutes of the stand at rest, whose heater is on now and then.
 fn stand(rng: &mut Xoshiro256PlusPlus) -> Record {
@@ -72,25 +61,6 @@ fn told(record: &Record, replicates: usize) -> Diagnosis {
         .diagnosis
 }
 
-fn said(d: &Diagnosis) -> String {
-    let found = d
-        .findings
-        .iter()
-        .map(|f| format!("{} on {:?}", f.cause, f.channels));
-    let left = d
-        .unexplained
-        .iter()
-        .map(|u| format!("unexplained {}: {}", u.channel, u.what));
-    found.chain(left).collect::<Vec<_>>().join("; ")
-}
-
-/// At most this chance that a rate as asked gives so few hits.
-fn asked(what: &str, hits: u64, of: u64, rate: f64) {
-    println!("{what}: {hits} of {of}");
-    let chance = 1.0 - numerics::tails::hits_at_least(hits + 1, of, rate);
-    assert!(chance > 1e-3, "{what}: {hits} of {of}, less than {rate}");
-}
-
 /// What is planted: the cause, its parameter, and the size.
 type Planted = (&'static str, &'static str, f64);
 
@@ -131,7 +101,7 @@ fn plant(kind: u64, record: &mut Record, name: &str, rng: &mut Xoshiro256PlusPlu
 #[test]
 fn what_is_planted_in_an_accelerometer_is_named_and_sized() {
     let runs = draws::of(16, 40);
-    let rng = &mut draws(1);
+    let rng = &mut rng(OWN_SEED, 1);
     let (mut named, mut alone, mut inside) = (0, 0, 0);
     for run in 0..runs {
         let mut record = stand(rng);
@@ -167,7 +137,7 @@ fn what_is_planted_in_an_accelerometer_is_named_and_sized() {
 #[test]
 fn faults_of_the_counts_of_an_accelerometer_are_named() {
     const RUNS: u64 = 8;
-    let rng = &mut draws(4);
+    let rng = &mut rng(OWN_SEED, 4);
     for (cause, fault) in [
         (
             "saturation",
@@ -203,7 +173,7 @@ fn faults_of_the_counts_of_an_accelerometer_are_named() {
 #[test]
 fn accelerometers_at_rest_are_silent_and_held_by_their_replicates() {
     const RUNS: u64 = 12;
-    let rng = &mut draws(2);
+    let rng = &mut rng(OWN_SEED, 2);
     let (mut silent, mut held) = (0, 0);
     for _ in 0..RUNS {
         let d = told(&stand(rng), 99);
@@ -230,7 +200,7 @@ fn accelerometers_at_rest_are_silent_and_held_by_their_replicates() {
 
 #[test]
 fn a_name_that_is_no_sensor_is_refused_and_one_kind_alone_is_diagnosed() {
-    let record = stand(&mut draws(3));
+    let record = stand(&mut rng(OWN_SEED, 3));
     let of = |names: &[&str]| {
         let names: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
         diagnose_channels(&record, &names, &DiagnoseOptions::default())
@@ -252,7 +222,7 @@ fn a_name_that_is_no_sensor_is_refused_and_one_kind_alone_is_diagnosed() {
 
 #[test]
 fn what_an_acceleration_costs_is_told_as_a_velocity() {
-    let mut rng = draws(4);
+    let mut rng = rng(OWN_SEED, 4);
     let mut record = stand(&mut rng);
     let n = (SECONDS * RATE_HZ) as usize;
     // 0.1 m/s^2 for half of the time, at a period of 60 s: from the middle of one half to that of the next 3 m/s come together.

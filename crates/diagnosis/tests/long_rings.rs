@@ -1,86 +1,31 @@
 //! Mounts that are knocked and ring on for seconds: size, duration, frequency and axes are drawn, and what is told is graded by rate.
-//! What is as loud for as long and does not ring is no shock. `IMU_STAND_SEED` takes other draws.
+//! What is as loud for as long and does not ring is no long shock. `IMU_STAND_SEED` takes other draws.
 
-mod draws;
+mod rates;
 
 use std::f64::consts::{PI, TAU};
 
-use diagnosis::result::{Diagnosis, Finding};
-use diagnosis::{DiagnoseOptions, diagnose};
+use diagnosis::result::Finding;
 use model::ModelFile;
-use model::record::{Channel, Record};
-use rand_core::SeedableRng;
-use rand_distr::{Distribution, Uniform};
+use model::record::Record;
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rates::{
+    GYRO_SIGMA as SIGMA, GYROS, RATE_HZ, add, asked, between, by_ratio, draws, rng, said, told,
+};
 
-const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-const RATE_HZ: f64 = 20.0;
+/// Seed of the draws.
+const OWN_SEED: u64 = 20_261_130;
 const SECONDS: f64 = 400.0;
-/// Noise of a reading of the paper's gyro, deg/s: 5.27 deg/sqrt(h) at 20 Hz.
-const SIGMA: f64 = 0.393;
-
-fn draws(of: u64) -> Xoshiro256PlusPlus {
-    let seed = draws::seed(20_261_130);
-    println!("seed {seed}");
-    Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
-}
-
-fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
-    Uniform::new(low, high).map_or(low, |u| u.sample(rng))
-}
-
-fn by_ratio(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
-    between(rng, low.ln(), high.ln()).exp()
-}
 
 fn stand(rng: &mut Xoshiro256PlusPlus) -> Record {
     let seed = between(rng, 0.0, 1e9) as u64;
     model::simulate(&ModelFile::paper(), SECONDS, RATE_HZ, seed).expect("a run")
 }
 
-/// Adds a signal to a channel, and rounds to its counts as the converter does.
-fn add(record: &mut Record, name: &str, of: impl Fn(f64) -> f64) {
-    let own = |c: &&mut Channel| c.name == name;
-    let channel = record.channels.iter_mut().find(own).expect("a channel");
-    let lsb = channel.lsb.expect("counts");
-    let counts = channel.counts.as_mut().expect("counts");
-    for (i, (v, c)) in channel.values.iter_mut().zip(counts).enumerate() {
-        *c += (of(i as f64 / RATE_HZ) / lsb).round() as i32;
-        *v = f64::from(*c) * lsb;
-    }
-}
-
-fn told(record: &Record) -> Diagnosis {
-    let options = DiagnoseOptions {
-        no_evidence: true,
-        ..DiagnoseOptions::default()
-    };
-    diagnose(record, &options).expect("a diagnosis").diagnosis
-}
-
-fn said(d: &Diagnosis) -> String {
-    let found = d
-        .findings
-        .iter()
-        .map(|f| format!("{} on {:?}", f.cause, f.channels));
-    let left = d
-        .unexplained
-        .iter()
-        .map(|u| format!("unexplained: {}", u.what));
-    found.chain(left).collect::<Vec<_>>().join("; ")
-}
-
-/// At most this chance that a rate as asked gives so few hits.
-fn asked(what: &str, hits: u64, of: u64, rate: f64) {
-    println!("{what}: {hits} of {of}");
-    let chance = 1.0 - numerics::tails::hits_at_least(hits + 1, of, rate);
-    assert!(chance > 1e-3, "{what}: {hits} of {of}, less than {rate}");
-}
-
 #[test]
 fn a_ring_of_seconds_is_named_alone_and_its_values_hold() {
     let runs = draws::of(12, 60);
-    let rng = &mut draws(1);
+    let rng = &mut rng(OWN_SEED, 1);
     let (mut alone, mut inside, mut values) = (0, 0, 0);
     for _ in 0..runs {
         let mut record = stand(rng);
@@ -136,9 +81,9 @@ fn a_ring_of_seconds_is_named_alone_and_its_values_hold() {
 }
 
 #[test]
-fn a_tone_and_a_hand_of_seconds_are_no_shocks() {
+fn a_tone_and_a_hand_of_seconds_are_no_long_shocks() {
     let runs = draws::of(4, 12);
-    let rng = &mut draws(2);
+    let rng = &mut rng(OWN_SEED, 2);
     let (mut none, mut all) = (0, 0);
     for _ in 0..runs {
         let (at, lasts) = (between(rng, 0.1, 0.9) * SECONDS, between(rng, 1.5, 5.0));

@@ -1,59 +1,23 @@
 //! Shocks hidden in simulated runs of the paper's stand: their shape, place, size and axes are drawn, and what is told of them
 //! is graded by rate. What is like a shock and none has another name, or none. `IMU_STAND_SEED` takes other draws.
 
-mod draws;
+mod rates;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-use diagnosis::result::Diagnosis;
-use diagnosis::{DiagnoseOptions, diagnose};
 use model::ModelFile;
-use model::record::{Channel, Record};
-use rand_core::SeedableRng;
-use rand_distr::{Distribution, Exp1, StandardNormal, Uniform};
+use model::record::Record;
+use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use rates::{
+    GYRO_SIGMA as SIGMA, GYROS, RATE_HZ, add, asked, between, by_ratio, draws, rng, said, told,
+};
 
-const GYROS: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
-const RATE_HZ: f64 = 20.0;
+/// Seed of the draws.
+const OWN_SEED: u64 = 20_261_124;
 const SECONDS: f64 = 600.0;
-/// Noise of a reading of the paper's gyro, deg/s: 5.27 deg/sqrt(h) at 20 Hz.
-const SIGMA: f64 = 0.393;
-
-fn draws(of: u64) -> Xoshiro256PlusPlus {
-    let seed = draws::seed(20_261_124);
-    println!("seed {seed}");
-    Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(1000) + of)
-}
-
-fn between(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
-    Uniform::new(low, high).map_or(low, |u| u.sample(rng))
-}
-
-fn by_ratio(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
-    between(rng, low.ln(), high.ln()).exp()
-}
-
-/// Adds a signal to a channel, and rounds to its counts as the converter does.
-fn add(record: &mut Record, name: &str, of: impl Fn(f64) -> f64) {
-    let own = |c: &&mut Channel| c.name == name;
-    let channel = record.channels.iter_mut().find(own).expect("a channel");
-    let lsb = channel.lsb.expect("counts");
-    let counts = channel.counts.as_mut().expect("counts");
-    for (i, (v, c)) in channel.values.iter_mut().zip(counts).enumerate() {
-        *c += (of(i as f64 / RATE_HZ) / lsb).round() as i32;
-        *v = f64::from(*c) * lsb;
-    }
-}
-
-fn told(record: &Record) -> Diagnosis {
-    let options = DiagnoseOptions {
-        no_evidence: true,
-        ..DiagnoseOptions::default()
-    };
-    diagnose(record, &options).expect("a diagnosis").diagnosis
-}
 
 /// A stand of other noise each time.
 fn stand(rng: &mut Xoshiro256PlusPlus) -> Record {
@@ -160,33 +124,10 @@ fn plant(
     }
 }
 
-fn said(d: &Diagnosis) -> String {
-    let found = d.findings.iter().map(|f| {
-        format!(
-            "{} on {:?} {:?}",
-            f.cause,
-            f.channels,
-            f.parameters.get("time").map(|p| p.value)
-        )
-    });
-    let left = d
-        .unexplained
-        .iter()
-        .map(|u| format!("unexplained {}: {}", u.channel, u.what));
-    found.chain(left).collect::<Vec<_>>().join("; ")
-}
-
-/// At most this chance that a rate as asked gives so few hits.
-fn asked(what: &str, hits: u64, of: u64, rate: f64) {
-    println!("{what}: {hits} of {of}");
-    let chance = 1.0 - numerics::tails::hits_at_least(hits + 1, of, rate);
-    assert!(chance > 1e-3, "{what}: {hits} of {of}, less than {rate}");
-}
-
 #[test]
 fn a_shock_is_named_alone_and_its_sizes_hold() {
     let runs = draws::of(40, 120);
-    let rng = &mut draws(1);
+    let rng = &mut rng(OWN_SEED, 1);
     let (mut named, mut alone, mut inside, mut sizes) = (0, 0, 0, 0);
     let (mut times, mut at) = (0, 0);
     for run in 0..runs {
@@ -251,7 +192,7 @@ fn a_shock_is_named_alone_and_its_sizes_hold() {
 #[test]
 fn a_clean_record_has_none() {
     let runs = draws::of(20, 60);
-    let rng = &mut draws(2);
+    let rng = &mut rng(OWN_SEED, 2);
     let quiet = (0..runs).filter(|_| {
         let d = told(&stand(rng));
         let quiet = d.findings.is_empty() && d.unexplained.is_empty();
@@ -270,7 +211,7 @@ fn without_a_shock(
     mut change: impl FnMut(&mut Record, &mut Xoshiro256PlusPlus),
 ) {
     let runs = runs * draws::of(1, 3);
-    let rng = &mut draws(of);
+    let rng = &mut rng(OWN_SEED, of);
     let none = (0..runs).filter(|_| {
         let mut record = stand(rng);
         change(&mut record, rng);
@@ -375,7 +316,7 @@ fn noise_with_tails_a_loud_stretch_and_levels_are_no_shocks() {
 fn a_shock_beside_single_far_readings_of_its_axis_is_named_and_so_are_they() -> Result<(), String> {
     // A share of 0.95 misses this in 2 %.
     draws::graded(20, 17, |draw| {
-        let rng = &mut draws(100 + draw);
+        let rng = &mut rng(OWN_SEED, 100 + draw);
         let mut record = stand(rng);
         let count = by_ratio(rng, 5.0, 36.0) as usize;
         far(&mut record, rng, count, 8.5);
@@ -410,7 +351,7 @@ fn a_knock_of_hundreds_of_standard_deviations_is_a_shock_and_its_length_holds() 
     let (mut inside, mut of) = (0, 0);
     // A share of 0.97 misses this in 2 %.
     let told_all = draws::graded(20, 18, |draw| {
-        let rng = &mut draws(200 + draw);
+        let rng = &mut rng(OWN_SEED, 200 + draw);
         let mut record = stand(rng);
         let (at, lasts) = (between(rng, 20.0, 580.0), by_ratio(rng, 0.2, 0.8));
         let peak = SIGMA * by_ratio(rng, 30.0, 1000.0) * between(rng, -1.0, 1.0).signum();
@@ -453,7 +394,7 @@ fn a_stand_that_is_handled_for_seconds_keeps_its_dependence_on_the_temperature()
 -> Result<(), String> {
     // A share of 0.95 misses this in 2 %.
     draws::graded(12, 10, |draw| {
-        let rng = &mut draws(300 + draw);
+        let rng = &mut rng(OWN_SEED, 300 + draw);
         let mut record = warmed(rng, 6.0);
         let slope = by_ratio(rng, 0.05, 0.2);
         let warmth: Vec<f64> = {

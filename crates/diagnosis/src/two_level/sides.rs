@@ -85,30 +85,8 @@ impl Sides<'_> {
 mod tests {
     use std::sync::Arc;
 
-    use model::effect::{Covariance, Frequencies};
-
+    use super::super::one_pole::OnePole;
     use super::*;
-
-    /// A process of variance exp(theta0) and correlation of exp(theta1) blocks.
-    struct OnePole;
-
-    impl Covariance for OnePole {
-        fn dimensions(&self) -> usize {
-            2
-        }
-
-        fn density(&self, theta: &[f64], at: &Frequencies) -> Vec<f64> {
-            at.one_pole(theta[0].exp(), (-(-theta[1]).exp()).exp())
-        }
-
-        fn bounds(&self, _: usize) -> Vec<(f64, f64)> {
-            vec![(-16.0, 6.0), (0.0, 8.0)]
-        }
-
-        fn starts(&self, _: usize) -> Vec<Vec<f64>> {
-            vec![vec![0.0, 3.0]]
-        }
-    }
 
     #[test]
     fn replicates_tell_two_levels_from_a_gaussian_process_of_their_spectrum() {
